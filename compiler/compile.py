@@ -30,7 +30,7 @@ from .core.passes import pipeline
 from .core.profiles import SineContract
 from .core.sums import is_split
 from .languages.dialect import NOTHING, Dialect
-from .languages.listing import Listing, listed
+from .languages.listing import listed
 from .languages.renderer import Renderer
 from .plan import Bound, Plan, plan_program
 from .proof import bounds, certificate
@@ -92,7 +92,7 @@ def assemble(
     arguments, role = dialect.arguments(kernel, lists, notes), kernel.interface.role
     called = [(t, arguments.split("\n") if t == CALLED else texts) for t, texts in entries]
     lines = header(title, dialect, called)
-    is_listed, entry = isinstance(dialect, Listing), dialect.entries[role]
+    is_listed, entry = dialect.is_listing, dialect.entries[role]
     source = listed(lines, programs_by_name) if is_listed else renderer.source(lines)
     if part:
         source, entry = dialect.apart(source, part), dialect.apart(entry, part)

@@ -1,76 +1,64 @@
 """All languages, a row each [`LANGUAGES`]: how source is made, which schedules there are, and what runs it.
 
 Those that an executor of the registry runs are in [`DENOISERS`]; the demo and the benchmark take those in
-[`TARGETS`]. Other programs run the kernels of the rest.
+[`TARGETS`]. Other programs run the kernels of the rest. A language, or a schedule, is imported when it is
+asked for first [`Lazy`].
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections import UserDict
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import cache
+from functools import cache, partial
+from importlib import import_module
 from typing import Any
 
 from ..refimpl.errors import CompileError, choice
 from .core.loops import USUAL, Forms
 from .core.profiles import IEEE, Profile, SineContract, profile_named
 from .kernel.interface import BLOCK, PATH, TABLE
-from .languages.c import C
-from .languages.cuda import CUDA
 from .languages.dialect import Dialect
-from .languages.glsl import GLSL, GLSLCompute
-from .languages.glsl_buffers import Compute, Vulkan
-from .languages.glsl_es import GLSLES, GodotDenoise, ShadertoyDenoise
-from .languages.listing import Listing
-from .languages.metal import Metal
-from .languages.opencl import LANES, OpenCL
-from .languages.wgsl import WGSL
-from .schedules.bytes import Dot, GroupDot
-from .schedules.fft import Fourier
-from .schedules.group import Grouped
 from .schedules.names import parse
-from .schedules.passes import FourierPasses
-from .schedules.plain import Packed, Plain
-from .schedules.schedules import Schedule
-from .schedules.straight import Inline
-from .schedules.tile import Tile
-
-HERE, SHOWN = "here", "shown"
-"""Whether an executor runs a target's kernels, and one that the demo and the benchmark show."""
+from .schedules.schedules import PLAIN, Schedule
 
 
-@dataclass(frozen=True)
+class Lazy(UserDict[str, Any]):
+    """Values by name, each of which is made when it is asked for first."""
+
+    def __getitem__(self, name: str) -> Any:
+        if isinstance(found := self.data[name], partial):
+            found = self.data[name] = found()
+        return found
+
+
+def _made(path: str, *args: Any, **parameters: Any) -> Any:
+    """Return an object of a class of this part, by its module and its name."""
+    module, _, kind = path.rpartition(".")
+    return getattr(import_module(f".{module}", __package__), kind)(*args, **parameters)
+
+
+@dataclass(frozen=True, eq=False)
 class Language:
     """Something that runs kernels: its language, and what there is for it.
 
-    `paths` are the numbers of paths that path kernels follow at once, none where there are no path kernels,
-    and `forms` says what becomes of a scene's primitives. `planes`: for how many pixels in a work item there
-    are kernels of the edge-avoiding filter; with 1 there is a history. `runs`: whether an executor of the
-    registry runs them, and whether the demo shows it. `profile`: the numerical profile of the kernels.
+    `schedules` by name, the plain one first. `paths` are the numbers of paths that path kernels follow at
+    once, none where there are no such kernels, nor kernels that encode; `forms` says what becomes of a
+    scene's primitives. `planes`: for how many pixels in a work item there are kernels of the edge-avoiding
+    filter; with 1 there is a history. `profile`: the numerical profile of the kernels.
     """
 
     dialect: Dialect
-    schedules: tuple[Schedule, ...]
+    schedules: Mapping[str, Schedule]
     paths: tuple[int, ...] = ()
     planes: tuple[int, ...] = ()
     forms: Forms = USUAL
-    runs: str = ""
     profile: Profile = IEEE
 
     @property
     def name(self) -> str:
         """Return the name."""
         return self.dialect.target
-
-    @property
-    def language(self) -> str:
-        """Return the name of the language, for a reader."""
-        return self.dialect.language
-
-    @property
-    def encodes(self) -> bool:
-        """Return whether there are kernels that encode features."""
-        return PATH in self.dialect.entries
 
     @property
     def sine(self) -> SineContract:
@@ -105,66 +93,115 @@ TILES = {
 }
 """Pixels of a tile, and its idea: AVX-512, AVX2, and SSE or NEON have those registers."""
 
+BYTES = "products of bytes, four at a time, of a network of integers"
+"""The idea of schedules of bytes."""
 
-def passes(dialect: Dialect, instead: str = "group:4") -> tuple[Schedule, ...]:
-    """Return the schedule of transforms for languages whose functions do not take such places."""
-    return (FourierPasses(dialect, "fftpasses:32", instead=instead, points=32),)
+Rungs = dict[str, "partial[Schedule]"]
+"""What makes each schedule of a language, by name."""
+
+FAMILIES = {
+    PLAIN: ("plain.Plain", ""),
+    "packed": ("plain.Packed", ""),
+    "inlined": ("straight.Inline", ""),
+    **dict.fromkeys(("vector", "tile"), ("tile.Tile", "lanes")),
+    "fft": ("fft.Fourier", "lanes"),
+    "fftpasses": ("passes.FourierPasses", "points"),
+    "dot": ("bytes.Dot", "lanes"),
+    "group": ("group.Grouped", "pixels"),
+    "groupdot": ("bytes.GroupDot", "pixels"),
+}
+"""Class of schedules by family, and what the parameter in their names is [schedules/names.py]."""
 
 
-def groups(dialect: Dialect) -> tuple[Schedule, ...]:
+def rungs(dialect: Dialect, *names: str, **more: Any) -> Rungs:
+    """Return what makes the schedules of these names; `more`: parameters of theirs, or an idea."""
+    found = {}
+    for name in names:
+        family, number = parse(name)
+        path, parameter = FAMILIES[family]
+        own = {parameter: number} if parameter else {}
+        found[name] = partial(_made, f"schedules.{path}", dialect, name, **own, **more)
+    return found
+
+
+def groups(dialect: Dialect) -> Rungs:
     """Return the schedules for graphics processors: more pixels share weights, until registers are short."""
     one = "a tile of the image in memory that a work group shares; layers in registers, one pixel an item"
     of = {"group": dialect.group}
-    found: list[Schedule] = [Grouped(dialect, "group:1", one, pixels=1, **of)]
+    found = rungs(dialect, "group:1", idea=one, **of)
     for pixels in (2, 4):
         idea = f"the same with {pixels} pixels an item, which share each weight"
-        found.append(Grouped(dialect, f"group:{pixels}", idea, pixels=pixels, instead="group:1", **of))
+        found |= rungs(dialect, f"group:{pixels}", idea=idea, instead="group:1", **of)
     if dialect.words:
-        idea = f"group:4 with {Dot.idea}: {dialect.words}"
-        found.append(GroupDot(dialect, "groupdot:4", idea, pixels=4, instead="group:4", **of))
-    return tuple(found)
+        idea = f"group:4 with {BYTES}: {dialect.words}"
+        found |= rungs(dialect, "groupdot:4", idea=idea, **of)
+    return found
 
 
-def _of(dialect: Dialect, *ladder: Schedule) -> Language:
-    """Return the target of a language; `ladder` are its schedules after the plain one."""
-    paths = (1,) if PATH in dialect.entries else ()
-    return Language(dialect, (Plain(dialect), *ladder), paths)
+def processor(dialect: Dialect) -> Rungs:
+    """Return the schedules of a language for processors, and for graphics processors where it has groups.
 
-
-def processor(dialect: Dialect) -> Language:
-    """Return the target of a language for processors, and for graphics processors where it has groups.
-
-    There are register tiles in each width of vector that the language has, transforms where its functions
-    take places in arrays, and bytes. Two tiles of 32 points side by side are as fast as four and take half
-    the memory; one takes a third more time: the weights pass by twice as often.
+    There are register tiles in each width of vector that the language has, transforms in one kernel where
+    those are several, since only then its functions take places in arrays, and bytes. Two tiles of 32 points
+    side by side are as fast as four and take half the memory; one takes a third more time: the weights pass
+    by twice as often.
     """
-    found: list[Schedule] = []
+    found = rungs(dialect, PLAIN)
     for name, (pixels, idea) in TILES.items():
         lanes = parse(name)[1]
         if lanes in dialect.tiles and (pixels > 1 or dialect.wide):
-            found.append(Tile(dialect, name, idea, lanes=lanes, pixels=pixels))
-    for lanes in dialect.tiles if dialect.transforms else ():
+            found |= rungs(dialect, name, idea=idea, pixels=pixels)
+    transforms = len(dialect.tiles) > 1
+    for lanes in dialect.tiles if transforms else ():
         tile = f"tile:{lanes}"
-        sizes = {"lanes": lanes, "pixels": TILES[tile][0], "points": 32, "tiles": 2}
+        sizes = {"pixels": TILES[tile][0], "points": 32, "tiles": 2}
         idea = f"the sums over the window by FFT, in tiles of 32 x 32 pixels and vectors of {lanes}"
-        found.append(Fourier(dialect, f"fft:{lanes}", idea, instead=tile, **sizes))
-    found += () if dialect.transforms else passes(dialect)
+        found |= rungs(dialect, f"fft:{lanes}", idea=idea, instead=tile, **sizes)
+    found |= {} if transforms else rungs(dialect, "fftpasses:32")
     if dialect.dot_of_bytes:
-        found.append(Dot(dialect, "dot:16", lanes=16, pixels=14))
-    return _of(dialect, *found, *(groups(dialect) if dialect.group else ()))
+        found |= rungs(dialect, "dot:16", idea=BYTES, pixels=14)
+    return found | (groups(dialect) if dialect.group else {})
+
+
+def fragments(dialect: Dialect) -> Rungs:
+    """Return the schedules of fragment shaders, and those of compute shaders beside them."""
+    compute = _made("languages.glsl.GLSLCompute")
+    passes = rungs(compute, "fftpasses:32", instead="inlined")
+    return rungs(dialect, PLAIN, "inlined") | passes | groups(compute)
+
+
+Ladder = Sequence[str] | Callable[[Dialect], Rungs]
+"""The schedules of a language: their names, or what makes them."""
+
+
+def _of(dialect: Dialect, ladder: Ladder = (PLAIN,), **more: Any) -> Language:
+    """Return the target of a language."""
+    paths = (1,) if PATH in dialect.entries else ()
+    found = ladder(dialect) if callable(ladder) else rungs(dialect, *ladder)
+    return Language(dialect, Lazy(found), **{"paths": paths, **more})
+
+
+def _named(path: str, ladder: Ladder = (PLAIN,), **more: Any) -> Language:
+    """Return the target of the language of a class."""
+    return _of(_made(f"languages.{path}"), ladder, **more)
+
+
+def _placed(name: str, home: str, weight: str) -> Language:
+    """Return a target whose weights are elsewhere."""
+    return _of(LANGUAGES[name].dialect.placed(home, weight))
 
 
 QUAD, PLAIN_INDEX = "weights[({index}) / 4][({index}) % 4]", "weights[{index}]"
 """A weight in a block of `vec4`, as std140 wants it; one in a table, or in memory of numbers."""
 
-HOMES: Mapping[str, Mapping[type[Dialect], str]] = {
-    TABLE: dict.fromkeys((Metal, CUDA, OpenCL, C, GodotDenoise), PLAIN_INDEX),
+HOMES: Mapping[str, Mapping[str, str]] = {
+    TABLE: dict.fromkeys(("metal", "cuda", "opencl", "c", "godot"), PLAIN_INDEX),
     BLOCK: {
-        **dict.fromkeys((GLSL, GLSLES, Vulkan, Compute, WGSL), QUAD),
-        **dict.fromkeys((Metal, OpenCL), PLAIN_INDEX),
+        **dict.fromkeys(("opengl", "glsl-es", "glsl-vulkan", "glsl-compute", "wgsl"), QUAD),
+        **dict.fromkeys(("metal", "opencl"), PLAIN_INDEX),
     },
 }
-"""Other places for weights than a target's usual one, and how a weight is read there, by language: a table in
+"""Other places for weights than a target's usual one, and how a weight is read there, by target: a table in
 the source, or a uniform block.
 
 Fragment shaders of GLSL have constants as straight code instead; compute shaders have no table: Mesa had not
@@ -178,41 +215,43 @@ to four times slower than statements; but it compiles the statements of 100 prim
 take 8,000 operations, in 1 to 5 s, those of 300 in 9 to 60 s. A walk is slower still than a loop
 (`wamnet bench primitives --executors opengl`)."""
 
-LANGUAGES: Mapping[str, Language] = {
-    target.name: target
-    for target in (
-        Language(
-            Listing(),
-            (Plain(Listing(), idea="one operation after another, all pixels at once"),),
-            paths=(1,),
+LANES = (1, 4, 8, 16)
+"""Numbers of paths that a work item of OpenCL follows at once, or of pixels that it filters."""
+
+LANGUAGES: Mapping[str, Language] = Lazy(
+    {
+        "numpy": partial(
+            _named,
+            "listing.Listing",
+            lambda dialect: rungs(dialect, PLAIN, idea="one operation after another, all pixels at once"),
             planes=(1,),
-            runs=SHOWN,
         ),
-        replace(processor(OpenCL()), paths=LANES, planes=LANES, forms=Forms(trees=True), runs=SHOWN),
-        replace(
-            _of(GLSL(), Inline(GLSL()), *passes(GLSLCompute(), "inlined"), *groups(GLSLCompute())),
-            planes=(1,),
-            forms=MESA,
-            runs=SHOWN,
+        "opencl": partial(
+            _named, "opencl.OpenCL", processor, paths=LANES, planes=LANES, forms=Forms(trees=True)
         ),
-        replace(processor(C()), planes=(1,), forms=Forms(trees=True), runs=HERE),
-        replace(_of(GLSLES(), Inline(GLSLES()), Packed(GLSLES())), forms=MESA),
-        *(processor(dialect()) for dialect in (Compute, Vulkan, WGSL, CUDA, Metal)),
-        Language(ShadertoyDenoise(), (Inline(ShadertoyDenoise()),)),
-        _of(GodotDenoise()),
-        *(
-            _of(language().placed(home, weight))
+        "opengl": partial(_named, "glsl.GLSL", fragments, planes=(1,), forms=MESA),
+        "c": partial(_named, "c.C", processor, planes=(1,), forms=Forms(trees=True)),
+        "glsl-es": partial(_named, "glsl_es.GLSLES", (PLAIN, "inlined", "packed"), forms=MESA),
+        "glsl-compute": partial(_named, "glsl_buffers.Compute", processor),
+        "glsl-vulkan": partial(_named, "glsl_buffers.Vulkan", processor),
+        "wgsl": partial(_named, "wgsl.WGSL", processor),
+        "cuda": partial(_named, "cuda.CUDA", processor),
+        "metal": partial(_named, "metal.Metal", processor),
+        "shadertoy": partial(_named, "glsl_es.ShadertoyDenoise", ("inlined",)),
+        "godot": partial(_named, "glsl_es.GodotDenoise"),
+        **{
+            f"{name}:{home}": partial(_placed, name, home, weight)
             for home, languages in HOMES.items()
-            for language, weight in languages.items()
-        ),
-    )
-}
+            for name, weight in languages.items()
+        },
+    }
+)
 """All targets by name."""
 
-TARGETS = {name: target for name, target in LANGUAGES.items() if target.runs == SHOWN}
+TARGETS = ("numpy", "opencl", "opengl")
 """The targets that the demo and the benchmark show, by the name of the executor that runs them."""
 
-DENOISERS = {name: target for name, target in LANGUAGES.items() if target.runs}
+DENOISERS = (*TARGETS, "c")
 """All targets that an executor of the registry runs."""
 
 ALIASES = {"glsl": "opengl"}
@@ -226,8 +265,3 @@ def language_named(name: Language | str) -> Language:
     if (known := ALIASES.get(name, name)) not in LANGUAGES:
         raise CompileError(f"target {name!r}: unknown ({choice(name, LANGUAGES)})")
     return LANGUAGES[known]
-
-
-def schedule_named(language: Language | str, name: str) -> Schedule:
-    """Return the schedule of this name in a language."""
-    return {schedule.name: schedule for schedule in language_named(language).schedules}[name]

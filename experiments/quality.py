@@ -357,7 +357,7 @@ def oidn(row: Row, frame: Frame) -> Floats:
 
 def certified(bench: Bench, kept: Results, rows: Sequence[str], seed: int) -> None:
     """Keep what the certificates of networks say: how far a colour may be off, over all pictures."""
-    known = [schedule.name for schedule in language_named(bench.executor).schedules]
+    known = list(language_named(bench.executor).schedules)
     wanted = {PLAIN: "", **({SPECTRA: ", by spectra"} if SPECTRA in known else {})}
     for row in rows:
         for schedule, end in wanted.items():

@@ -130,7 +130,6 @@ class C(Arguments):
     casts = True
     byte = "uint8_t"
     own = "wamnet_"
-    transforms = True
     tiles = (16, 8, 4)
     dot_of_bytes = "wamnet_dot(&{total}, &{weights}, {place});"
     weight_vector = "*(const wamnet_vector *)(weights + ({index}) * LANES)"

@@ -75,10 +75,11 @@ class Dialect:
     it may write encoded images in place of sums. `helpers`: functions that operations on vectors call.
     `scalars`: the types of single numbers. `one_type`: what is read as vectors is not read as numbers.
     `staged`: a launch is a program, which is compiled if STAGE is its number; `declares_memory`: what
-    launches of a denoiser hand on are arrays like others. `numbers` makes the address of a vector that of its
-    first number. `mixed`: of an array of vectors whose components are read by their own index too the
-    declaration, an element, and an element's address, and `mixed_number` such a component; `linkage` is
-    before the type of a function, `place_type` that of places.
+    launches of a denoiser hand on are arrays like others. `is_listing`: programs
+    are printed, not kernels. `numbers` makes the address of a vector that of its first number. `mixed`: of an
+    array of vectors whose components are read by their own index too the declaration, an element, and an
+    element's address, and `mixed_number` such a component; `linkage` is before the type of a function,
+    `place_type` that of places.
     """
 
     target: str
@@ -131,7 +132,6 @@ class Dialect:
     dot_of_bytes: str = ""
     instructions: str = ""
     own: str = ""
-    transforms: bool = False
     tiles: tuple[int, ...] = (4,)
     words: str = ""
     wide: bool = True
@@ -155,6 +155,7 @@ class Dialect:
     launches: tuple[str, str] = ("", "")
     followed: str = "item (i, j) follows the pixels from {columns} * i on of row first_row + j"
     declares_memory: bool = False
+    is_listing: bool = False
     local_place: tuple[str, str] = ("", "")
     group_place: tuple[str, str] = ("", "")
     operations: Mapping[str, str] = {

@@ -21,6 +21,7 @@ class Listing(Dialect):
     target = "numpy"
     language = "wamnet IR"
     suffix = ".ir.txt"
+    is_listing = True
     entries = dict.fromkeys(INTEGERS, "program")
     max_output_channels = 2**16
     native_sine = SineContract("np.sin, whose documentation promises nothing", None)

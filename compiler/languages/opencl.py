@@ -36,9 +36,6 @@ void paint(__global float *restrict to, int step, float{lanes} values, int left)
 }}"""
 """The function that writes a channel of the pixels of an item, or of those that are left of its row."""
 
-LANES = (1, 4, 8, 16)
-"""Numbers of paths that a work item follows at once, or of pixels that it filters."""
-
 
 def any_lane(lanes: int) -> str:
     """Return the function that tells whether any component of a boolean holds: `or` of halves."""
@@ -104,7 +101,6 @@ class OpenCL(Arguments):
 
     unroll = "#pragma unroll"
     casts = True
-    transforms = True
     tiles = (16, 8, 4)
     dot_of_bytes = "{total} = DOT({total}, {weights}, ((const fours *)({place}))->bytes);"
     words = "cl_khr_integer_dot_product where -cl-std=CL3.0 and the device have it, else shifts"

@@ -7,24 +7,28 @@ output is a zero that may have either sign [`has_one_zero`].
 
 from __future__ import annotations
 
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from ..core import ir
 from ..core.ir import Program
-from . import integer_checker
-from .evidence import Refused
+
+if TYPE_CHECKING:
+    from .integer_checker import Range
 
 
 class Rounds(Exception):
     """A sentence that says which operation of a program may round, or leave its kind of number."""
 
 
-def ranges(program: Program) -> tuple[list[integer_checker.Range], dict[str, list[float]]]:
+def ranges(program: Program) -> tuple[list[Range], dict[str, list[float]]]:
     """Return what the checker knows of each value, and the sums of magnitudes, or raise [`Rounds`]."""
     if program.gather is None or not program.gather.whole:
         raise Rounds("the images do not hold integers")
+    from . import integer_checker
+    from .evidence import Refused
+
     arrays = {name: array.astype(np.float64) for name, array in program.parameters.items()}
     try:
         return integer_checker.ranges(ir.text(program), arrays)

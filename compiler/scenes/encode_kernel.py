@@ -141,14 +141,14 @@ def compile_encode(
             f"the sums have no planes {', '.join(sorted(lacking))}: the features {', '.join(features)} are "
             "computed from them; add them to the path kernel"
         )
-    if not chosen.encodes:
+    if not chosen.paths:
         raise CompileError(
             f"target {chosen.name} has no kernels that encode features: use one that has them, such as opencl"
         )
     if len(images) > (most := chosen.dialect.max_images):
         raise CompileError(
-            f"the kernel encodes {len(images)} features: {chosen.language} writes at most {most} images at "
-            "once; use fewer"
+            f"the kernel encodes {len(images)} features: {chosen.dialect.language} writes at most {most} "
+            "images at once; use fewer"
         )
     facts = {
         "schema": SCHEMA,

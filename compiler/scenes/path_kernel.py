@@ -29,7 +29,6 @@ from ..kernel import interface
 from ..kernel.kernel import Kernel
 from ..languages.dialect import Dialect
 from ..languages.glsl_es import GodotDenoise, ShadertoyDenoise
-from ..languages.listing import Listing
 from ..languages.renderer import Renderer
 from ..targets import Language, language_named
 from . import emit_path
@@ -113,7 +112,7 @@ def compile_path(
         chosen,
         renderer,
         list(passed.items()),
-        [*entries, *([] if isinstance(dialect, Listing) else [(CALLED, ())])],
+        [*entries, *([] if dialect.is_listing else [(CALLED, ())])],
         facts,
         emitted,
         images=images,

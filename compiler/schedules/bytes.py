@@ -104,7 +104,6 @@ def runs_of(program: Program, parameter: str) -> list[list[int]]:
 class Dot(Tile):
     """A tile whose products are of bytes."""
 
-    idea = "products of bytes, four at a time, of a network of integers"
     order = (
         "matrices block by block of neurons: blocks x fours of inputs x neurons x 4 bytes with a sign; "
         "inputs that are the window go image by image, then row of taps by row, each filled up to fours; "
@@ -229,6 +228,7 @@ class GroupDot(Grouped):
         "by tap in rows, then word by word"
     )
     bytewise = True
+    instead = "group:4"
     element = tree.INT
     weights = tree.INT.of(FOUR)
     part = ""

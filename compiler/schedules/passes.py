@@ -78,6 +78,7 @@ class FourierPasses(Transformed, Straight):
         "second channel, neurons; weights of the layers after it are constants of the source"
     )
 
+    instead = "group:4"
     lanes = HALF
     tiles = 1
 

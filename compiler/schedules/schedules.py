@@ -12,10 +12,10 @@ The layout of the weights belongs to the schedule: kernels walk through them in 
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from copy import copy
 from dataclasses import replace
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -29,13 +29,14 @@ from ..kernel.interface import PLAIN as PLAIN
 from ..kernel.kernel import Kernel
 from ..kernel.sizes import integer, item_bytes
 from ..languages.dialect import Dialect
-from ..languages.listing import Listing
 from ..languages.renderer import Renderer
 from ..proof import bounds
 from ..proof.bounds import Enclosure
-from ..proof.spectra import Spectra
 from .common import Nest, groups_of, kernel_gather, output_channels, readers_of_window
 from .names import remedy
+
+if TYPE_CHECKING:
+    from ..proof.spectra import Spectra
 
 Images = Mapping[str, NDArray[np.float32]]
 
@@ -109,7 +110,7 @@ class Schedule(Nest):
 
         `bounded`: an error bound is stated, and the language must keep the order of operations.
         """
-        if not isinstance(self.dialect, Listing):
+        if not self.dialect.is_listing:
             _check_channels(program, self.dialect)
         return Renderer(self.dialect, self.kernel(program), bounded, self.pack(program))
 
@@ -220,16 +221,16 @@ def _others_between_loops(program: Program) -> str:
     return ""
 
 
-def pick(schedules: Sequence[Schedule], name: str, program: Program) -> tuple[Schedule, str]:
+def pick(schedules: Mapping[str, Schedule], name: str, program: Program) -> tuple[Schedule, str]:
     """Return the schedule of this name, or the one in its place that holds the program, with the reason."""
-    known = {schedule.name: schedule for schedule in schedules}
-    if name not in known:
-        raise CompileError(f"schedule {name!r}: unknown to this target ({remedy(name, known)})")
-    chosen, first = known[name], ""
-    while chosen is not schedules[0] and (reason := chosen.refusal(program)):
+    if name not in schedules:
+        raise CompileError(f"schedule {name!r}: unknown to this target ({remedy(name, schedules)})")
+    last, first = next(iter(schedules)), ""
+    while name != last and (reason := schedules[name].refusal(program)):
         first = first or reason
-        chosen = known[chosen.instead]
-    if chosen is schedules[0] and (reason := chosen.impossible(program)):
+        name = schedules[name].instead
+    chosen = schedules[name]
+    if name == last and (reason := chosen.impossible(program)):
         raise CompileError(
             f"no schedule of this target can run the program: {reason}; compile for another target"
         )

@@ -28,10 +28,10 @@ from ...compiler.compile import compile_plan
 from ...compiler.core import profiles, sine
 from ...compiler.core.lower import lower
 from ...compiler.plan import Plan, plan_program
-from ...compiler.schedules.bytes import Dot
+from ...compiler.schedules import names
 from ...compiler.schedules.common import kernel_gather
 from ...compiler.schedules.schedules import PLAIN
-from ...compiler.targets import DENOISERS, TARGETS, Language, language_named, schedule_named
+from ...compiler.targets import DENOISERS, TARGETS, Language, language_named
 from ...compiler.variants import parse, vary
 from ...refimpl.errors import ExecutorUnavailable, InputError
 from ...refimpl.network.denoise import Model
@@ -205,7 +205,7 @@ QUICK = ("onnxruntime", "oidn:fast")
 def kernel(language: Language | str, schedule: str, variant: Variant = FULL) -> Contender:
     """Return the kernel in an executor's language with a schedule: of the whole network, or of a variant."""
     language = language_named(language)
-    name, text = f"{language.name}:{schedule}", schedule_named(language, schedule).idea
+    name, text = f"{language.name}:{schedule}", language.schedules[schedule].idea
     if variant is not FULL:
         name, text = f"{name}:{variant.name}", variant.text
     opens = partial(_opened, language, schedule, variant)
@@ -253,12 +253,13 @@ def of_machine(
     schedules that suit their devices for pictures of this size, the first variant, and `QUICK`.
     """
     found = []
-    for name, target in DENOISERS.items():
+    for name in DENOISERS:
+        target = language_named(name)
         try:
             suits = tools.executor(name).schedule_for((size, size))
         except ExecutorUnavailable:
-            suits = target.schedules[0].name
-        schedules = [suits] if quick else [schedule.name for schedule in target.schedules]
+            suits = PLAIN
+        schedules = [suits] if quick else list(target.schedules)
         found += [kernel(target, schedule) for schedule in schedules]
         varied = [*(VARIANTS[:1] if quick else VARIANTS), *forms] if name in TARGETS else []
         for form in [*varied, *([] if quick else [INTEGERS])] if name != "numpy" else []:
@@ -277,11 +278,11 @@ def _schedules(language: Language, suits: str, form: Variant) -> list[str]:
     A first layer in two passes has the direct one only, integers instead those in bytes where a language has
     such. Spectra name what takes their place in two passes.
     """
-    schedule = schedule_named(language, suits)
+    schedule = language.schedules[suits]
     direct = schedule.name if schedule.instead == PLAIN else schedule.instead
     others = [suits] if not form.rank else []
     if form is INTEGERS:
-        others = [each.name for each in language.schedules if isinstance(each, Dot)]
+        others = [each for each in language.schedules if names.parse(each)[0] == "dot"]
     return list(dict.fromkeys([*others, direct]))
 
 

@@ -195,7 +195,7 @@ def _compiled(request: Request) -> Export:
     pair = check_pair.pair(plan, plan.model, plan.bound.output is not None, programs, others)
     held, first = denoiser.manifest, denoiser.kernels[0].manifest
     facts = {
-        "language": row.text or row.language.language,
+        "language": row.text or row.language.dialect.language,
         **{name: held[name] for name in ("profile", "output", "bound")},
         "images": first["images"],
         "window": {"size": plan.model.window.size, "border": first["window"]["border"]},

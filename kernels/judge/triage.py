@@ -214,7 +214,7 @@ def kernels_of(
     kernels = []
     for runner in runners:
         language = runner.language
-        every = [schedule.name for schedule in language.schedules]
+        every = list(language.schedules)
         named = which if which != PICKED else instead.get(language.name) or runner.picked(size)
         for schedule in every if which == EVERY else [named]:
             key = (language.name, schedule)

@@ -316,7 +316,7 @@ class Measurement:
     def promising(self) -> tuple[str, ...]:
         """Return the schedules under which the full network is fastest on a small picture, the best first."""
         plan = self._plan()
-        found = (_compiled(plan.scheduled(schedule.name)) for schedule in plan.target.schedules)
+        found = (_compiled(plan.scheduled(name)) for name in plan.target.schedules)
         small = Tuning(self.executor, plan.model, (TRIAL, TRIAL), plan.varied.rank)
         trials = {artifact.plan.asked: small.trial(artifact) for artifact in found if artifact}
         return tuple(sorted(trials, key=trials.__getitem__)[:MOST_SCHEDULES])

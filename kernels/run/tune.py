@@ -125,7 +125,7 @@ class Tuning:
         rows: dict[str, Row] = {}
         ready: dict[str, Artifact] = {}
         trials: dict[str, float] = {}
-        for name in (schedule.name for schedule in plan.target.schedules):
+        for name in plan.target.schedules:
             try:
                 row, artifact = self._built(plan.scheduled(name))
                 self._check(artifact, crop)

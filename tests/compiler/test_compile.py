@@ -24,7 +24,7 @@ from wamnet.compiler.core.trace import trace
 from wamnet.compiler.languages.glsl_es import ShadertoyDenoise
 from wamnet.compiler.plan import analysed
 from wamnet.compiler.schedules.plain import Packed
-from wamnet.compiler.targets import DENOISERS, language_named, schedule_named
+from wamnet.compiler.targets import DENOISERS, language_named
 from wamnet.refimpl.errors import CompileError
 from wamnet.refimpl.network import dataset, siren
 from wamnet.refimpl.network.denoise import Model, denoise_pixel
@@ -69,7 +69,7 @@ def test_lowered_model_is_the_reference():
 
 def test_weights_are_packed_input_major():
     program = lower(model())
-    plain = schedule_named("opencl", "plain")
+    plain = language_named("opencl").schedules["plain"]
     slots, packed = plain.layout(program), plain.pack(program)
     for name, array in program.parameters.items():
         slot = slots[name]

@@ -23,7 +23,7 @@ from wamnet.compiler.proof import bounds, spectra, spectra_checker
 from wamnet.compiler.schedules import fourier
 from wamnet.compiler.schedules.fft import Fourier, sizes_of
 from wamnet.compiler.schedules.schedules import LARGEST_PRIVATE
-from wamnet.compiler.targets import language_named, schedule_named
+from wamnet.compiler.targets import language_named
 from wamnet.refimpl.errors import CompileError
 from wamnet.refimpl.network import siren
 from wamnet.refimpl.network.denoise import denoise_pixel
@@ -32,7 +32,7 @@ from wamnet.refimpl.network.window import BORDERS, Window
 POWERS = (1, 2, 4, 8, 16, 32, 64)
 """Lengths of transforms."""
 
-FFT32 = schedule_named("opencl", "fft:16")
+FFT32 = language_named("opencl").schedules["fft:16"]
 TURN, HALF_TURN = 2.8, 2.3
 """FOU-5: coefficients of a product with a factor, and with one of an eighth of a turn."""
 

@@ -63,7 +63,7 @@ def subscripts(source):
 
 
 CASES = [
-    (target, schedule.name)
+    (target, schedule)
     for target in LANGUAGES
     if target != "numpy"
     for schedule in language_named(target).schedules

@@ -131,7 +131,7 @@ def encode_text(target):
 
 WRITTEN = [target for target in LANGUAGES.values() if target.name != "numpy"]
 CASES = [(path_text, target.name) for target in WRITTEN if target.paths]
-CASES += [(encode_text, target.name) for target in WRITTEN if target.encodes]
+CASES += [(encode_text, target.name) for target in WRITTEN if target.paths]
 
 
 def check_picture(text, height, width):

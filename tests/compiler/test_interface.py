@@ -48,7 +48,7 @@ def kernels(target, model):
     if language_named(target).paths:
         programs = lower_scene(canonical("lone_light"), Settings(max_depth=1))
         yield compile_path(programs, target, groups=("color", "normal"))
-    if language_named(target).encodes:
+    if language_named(target).paths:
         yield compile_encode(FEATURES, Normalization(), target)
 
 
@@ -93,7 +93,7 @@ def test_an_export_lists_every_argument_of_its_kernels(name, model):
         assert [each["name"] for each in bound] == wanted
 
 
-@pytest.mark.parametrize("target", [t.name for t in LANGUAGES.values() if not t.encodes])
+@pytest.mark.parametrize("target", [t.name for t in LANGUAGES.values() if not t.paths])
 def test_a_target_without_a_role_is_refused(target):
     programs = lower_scene(canonical("lone_light"), Settings(max_depth=1))
     with pytest.raises(CompileError, match=f"target {target} has no path kernels"):

@@ -17,7 +17,7 @@ from wamnet.compiler.schedules.names import FORMER, parse, split
 from wamnet.compiler.schedules.schedules import LARGEST_PRIVATE
 from wamnet.compiler.schedules.straight import LARGEST_WEIGHTS
 from wamnet.compiler.schedules.tile import Tile
-from wamnet.compiler.targets import TARGETS, language_named, schedule_named
+from wamnet.compiler.targets import TARGETS, language_named
 from wamnet.refimpl.errors import CompileError
 from wamnet.refimpl.network import siren
 from wamnet.refimpl.network.denoise import denoise_pixel
@@ -120,7 +120,7 @@ def test_groups_find_every_weight(channels, size, hidden):
     """Read the array as the kernel's loops do: image, four channels, tap, channel."""
     network = siren.init((size * size * sum(channels), hidden, 3), 3.0, 3.0, seed=1, dtype=np.float32)
     program = gathered(lambda x: denoise_pixel(network, x), channels, size)
-    group = schedule_named("opencl", "group:4")
+    group = language_named("opencl").schedules["group:4"]
     packed, layout = group.pack(program), group.layout(program)
     for name, slot in layout.items():
         assert slot.offset % 4 == 0
@@ -169,7 +169,7 @@ def test_the_manifest_says_what_was_picked():
     assert plain["bound"] == found["bound"]
 
 
-OPENCL_PLAIN = TARGETS["opencl"].schedules[0]
+OPENCL_PLAIN = language_named("opencl").schedules["plain"]
 """The first rung."""
 
 
@@ -194,11 +194,11 @@ def test_a_former_name_is_told_with_the_present_one(former, present):
     target = "opengl" if former.startswith("compute") else "opencl"
     with pytest.raises(CompileError, match=rf"schedule '{former}': unknown .*its name is {present} now\)$"):
         compile_program(small(), target, schedule=former)
-    assert schedule_named(target, present).name == present
+    assert language_named(target).schedules[present].name == present
 
 
 def test_names_are_families_with_their_parameter():
-    names = {schedule.name for target in TARGETS.values() for schedule in target.schedules}
+    names = {name for target in TARGETS for name in language_named(target).schedules}
     assert {parse(name) for name in names} > {("plain", None), ("inlined", None), ("tile", 8), ("group", 1)}
     for name in names:
         for form in ("", "whole8", "window6+rank12"):
@@ -238,7 +238,7 @@ def test_what_a_tile_does_not_hold_is_plain_with_the_reason(case, target):
 
 @given(
     schedule=st.sampled_from(
-        [s for t in ("opencl", "c") for s in language_named(t).schedules if type(s) is Tile]
+        [s for t in ("opencl", "c") for s in language_named(t).schedules.values() if type(s) is Tile]
     ),
     channels=st.lists(st.integers(1, 4), min_size=1, max_size=3),
     size=st.integers(1, 3),

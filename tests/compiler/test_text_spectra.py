@@ -48,7 +48,9 @@ def kernel(folder, target="opencl", points=8, tiles=2, **kwargs):
     whole = targets.LANGUAGES[target]
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(fft, "COST", 0.0)
-        patch.setitem(targets.LANGUAGES, target, replace(whole, schedules=(*whole.schedules, tiny)))
+        patch.setitem(
+            targets.LANGUAGES, target, replace(whole, schedules={**whole.schedules, tiny.name: tiny})
+        )
         made = compile_program(lower(model(**kwargs)), target, schedule=tiny.name)
     assert made.manifest["schedule"]["name"] == tiny.name
     artifact.write(made, folder)

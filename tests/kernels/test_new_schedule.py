@@ -45,7 +45,7 @@ def test_a_builder_and_a_line_are_all_that_a_new_schedule_needs(monkeypatch, exe
     """In each language its kernels compute what plain ones do, to the bit, within the same bound."""
     executor = executor_named("opengl-egl" if target == "opengl" else target)
     known = targets.language_named(target)
-    added = replace(known, schedules=(*known.schedules, Backwards(known.dialect)))
+    added = replace(known, schedules={**known.schedules, "backwards": Backwards(known.dialect)})
     monkeypatch.setitem(targets.LANGUAGES, target, added)
     program = kit.denoiser(kit.network([54, 6, 3], (3.0, 3.0)), {"color": 3, "normal": 3}, 3, "clamp")
     drawn = np.random.default_rng(1).uniform(-2, 2, (2, 5, 7, 3)).astype(np.float32)

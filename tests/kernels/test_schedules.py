@@ -13,7 +13,7 @@ from kit import COMPILED, networks, pictures, ways
 from wamnet.compiler.compile import compile_plan, compile_program
 from wamnet.compiler.core.lower import lower
 from wamnet.compiler.schedules import fft
-from wamnet.compiler.targets import DENOISERS
+from wamnet.compiler.targets import DENOISERS, LANGUAGES
 from wamnet.compiler.variants import plan_model
 from wamnet.kernels import denoise_on
 from wamnet.kernels.devices import opencl_executor, opengl_executor
@@ -48,7 +48,7 @@ LARGEST_LAYERS = {("opencl", f"group:{pixels}"): (12, 30) for pixels in (1, 2, 4
 UNLIMITED = (12, 70)
 """The same of those that have loops: in long runs half of their networks are as wide as trained ones."""
 
-GROUPED = {(t.name, s.name): s for t in DENOISERS.values() for s in t.schedules if hasattr(s, "group")}
+GROUPED = {(t, s.name): s for t in DENOISERS for s in LANGUAGES[t].schedules.values() if hasattr(s, "group")}
 """The schedules whose groups share a tile."""
 
 

@@ -21,7 +21,7 @@ from wamnet.compiler.compile import compile_plan, compile_program
 from wamnet.compiler.core.ir import Program
 from wamnet.compiler.core.lower import lower
 from wamnet.compiler.plan import plan_program
-from wamnet.compiler.targets import DENOISERS
+from wamnet.compiler.targets import DENOISERS, LANGUAGES
 from wamnet.kernels import denoise_on
 from wamnet.kernels.run.denoise_on import images_of
 from wamnet.kernels.run.render_frame import render_frame
@@ -119,7 +119,7 @@ def test_whole_frames_equal_the_definition(denoiser, name):
 def test_certified_bounds_are_below_a_step_of_a_display(name, target):
     """Over all pictures, of all schedules that hold the model; of the shelf's: test_certify_shelf.py."""
     program = lower(load_model(Path(name)))
-    plans = [plan_program(program, target, schedule=each.name) for each in DENOISERS[target].schedules]
+    plans = [plan_program(program, target, schedule=each) for each in LANGUAGES[target].schedules]
     shared = [plan for plan in plans if plan.shares_bound]
     for plan in (*shared[:1], *(plan for plan in plans if not plan.shares_bound)):
         assert compile_plan(plan).certificate is not None

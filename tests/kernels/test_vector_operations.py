@@ -8,11 +8,11 @@ import pytest
 from wamnet.compiler.core.ops import OPS
 from wamnet.compiler.kernel.interface import BOTH, READ, TRAIN, Array, Interface
 from wamnet.compiler.kernel.kernel import FLOAT, Kernel, Launch, Store, apply, const, load, name
-from wamnet.compiler.languages.opencl import LANES, OpenCL
+from wamnet.compiler.languages.opencl import OpenCL
 from wamnet.compiler.languages.renderer import Renderer
 from wamnet.compiler.scenes.lower_scene import lower_scene
 from wamnet.compiler.scenes.path_kernel import compile_path
-from wamnet.compiler.targets import language_named
+from wamnet.compiler.targets import LANES, language_named
 from wamnet.refimpl.light import scenes
 from wamnet.refimpl.light.transport import Settings
 

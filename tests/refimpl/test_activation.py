@@ -148,7 +148,7 @@ def test_one_row_is_all_that_a_new_activation_needs(monkeypatch: pytest.MonkeyPa
     network = siren.init((27, 6, 5, 3), 1.0, 1.0, 5, activation="leaky")
     program = lower(Model(network, ("color",), Window(3), Normalization()))
     for name, target in LANGUAGES.items():
-        for schedule in target.schedules:
+        for schedule in target.schedules.values():
             kernel = compile_program(program, name, schedule=schedule.name)
             errors = kernel.manifest["bound"]["output"]
             assert all(math.isfinite(error) and error > 0 for error in errors), name

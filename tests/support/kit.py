@@ -15,7 +15,7 @@ from wamnet.compiler.compile import compile_program
 from wamnet.compiler.core.ir import Gather, Image, Program, Type, sha256
 from wamnet.compiler.core.trace import trace
 from wamnet.compiler.schedules.names import parse
-from wamnet.compiler.targets import DENOISERS
+from wamnet.compiler.targets import DENOISERS, LANGUAGES
 from wamnet.kernels import Pipeline
 from wamnet.refimpl.light.scenes import canonical
 from wamnet.refimpl.light.transport import Settings
@@ -74,7 +74,7 @@ def ways(fits: Callable[[Any], bool]) -> list[Any]:
 
     The others are the same statements with other numbers, of which each is tested in NumPy.
     """
-    found = [(t.name, s.name) for t in DENOISERS.values() for s in t.schedules if fits(s)]
+    found = [(t, s.name) for t in DENOISERS for s in LANGUAGES[t].schedules.values() if fits(s)]
     sizes = {way: parse(way[1])[1] or 0 for way in found}
     largest = {(way[0], parse(way[1])[0]): way for way in sorted(found, key=sizes.__getitem__)}
     marks = {way: () if way in largest.values() else pytest.mark.nightly for way in found}

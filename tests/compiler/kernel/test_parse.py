@@ -112,11 +112,11 @@ def test_round_trip(kit, window, hidden, border, relu, shape, bounded):
 
 
 SCHEDULES = [
-    (target.name, schedule.name)
-    for target in TARGETS.values()
-    if target.name in GRAMMARS
-    for schedule in target.schedules
-    if target.name in ("opengl", "glsl-vulkan", "glsl-compute") or schedule.name != "fftpasses:32"
+    (target, schedule)
+    for target in TARGETS
+    if target in GRAMMARS
+    for schedule in TARGETS[target].schedules
+    if target in ("opengl", "glsl-vulkan", "glsl-compute") or schedule != "fftpasses:32"
 ]
 """All schedules of all languages that are read: of launches those of GLSL."""
 

@@ -213,7 +213,7 @@ def test_variants_are_within_their_bound(executor, model, variant) -> None:
 
 
 def test_names_are_unique_and_schedules_complete() -> None:
-    from wamnet.compiler.targets import TARGETS
+    from wamnet.compiler.targets import LANGUAGES, TARGETS
 
     with Tools() as tools:
         everybody = contenders.of_machine(tools, SIZE)
@@ -224,7 +224,7 @@ def test_names_are_unique_and_schedules_complete() -> None:
     with Tools() as tools:
         trained = contenders.of_machine(tools, SIZE, forms=[form])
     assert {each.executor for each in trained if each.variant is form} == {"opencl", "opengl"}
-    assert {f"{t.name}:{s.name}" for t in TARGETS.values() for s in t.schedules} <= set(names)
+    assert {f"{t}:{s}" for t in TARGETS for s in LANGUAGES[t].schedules} <= set(names)
     assert {each.name for each in few} < set(names)
 
 

@@ -78,7 +78,7 @@ class GLSL(Dialect):
     """The dialect's table; `preamble` are the first lines, in which `{unordered}` has its place.
 
     `sampler`, `colour`: the declarations of a texture and of a colour buffer; `started` is before the name of
-    a buffer that gets its first value; `above`: functions above `main`.
+    a buffer that gets its first value; `above`: functions above `main`; `beginning`: its first lines.
     """
 
     target = "opengl"
@@ -122,6 +122,7 @@ class GLSL(Dialect):
     started = ""
     main = "void main()"
     above: tuple[str, ...] = ()
+    beginning: tuple[str, ...] = ()
     max_output_channels = 4 * MOST_RESULTS
     channels_per_result: int | None = 4
     planes_per_buffer = 4
@@ -154,7 +155,7 @@ class GLSL(Dialect):
             whole = kernel.weights.lanes > 1
             lines += fetch("vec4", "texel", "place", "") if whole else fetch("float", "index", "texel", ".r")
             lines.append("")
-        lines += [*self.above, self.main, "{"]
+        lines += [*self.above, self.main, "{", *self.beginning]
         if role == DENOISE:
             first = samplers[0]
             lines += [

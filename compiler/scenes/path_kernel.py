@@ -26,7 +26,6 @@ from ..compile import CALLED, Entry, asdict_finite, assemble
 from ..core import ir
 from ..core.passes import pipeline
 from ..kernel import interface
-from ..kernel.kernel import Kernel
 from ..languages.dialect import Dialect
 from ..languages.glsl_es import GodotDenoise, ShadertoyDenoise
 from ..languages.renderer import Renderer
@@ -213,39 +212,22 @@ void mainImage(out vec4 fragColor, in vec2 fragCoord)
     fragColor = wamnet_trace(ivec2(fragCoord), int(iResolution.x), int(iResolution.y), uint(iFrame));
 }"""
     }
-    takes = "ivec2 at, int width, int height, uint seed_number"
-    uniforms_of_host: tuple[str, ...] = ()
+    main = "vec4 wamnet_trace(ivec2 at, int width, int height, uint seed_number)"
+    beginning = (
+        "    vec4 image = vec4(0.0, 0.0, 0.0, 1.0);",
+        "    const int first_row = 0;",
+        "    const int samples = 1;",
+        "    const uint first_sample = 0u;",
+    )
+    numbers_of_host: Sequence[tuple[str, int]] = ()
 
-    def begin(self, kernel: Kernel, top: str, bounded: bool) -> str:
-        """Return the text of a shader up to its first statement."""
-        places = zip(kernel.interface.place, self.fragment, strict=True)
-        lines = [
-            *([self.preamble] if self.preamble else []),
-            top,
-            *self.uniforms_of_host,
-            "",
-            f"vec4 wamnet_trace({self.takes})",
-            "{",
-            "    vec4 image = vec4(0.0, 0.0, 0.0, 1.0);",
-            *ONE_SAMPLE,
-            *(f"    int {name} = {text};" for name, text in places),
-        ]
-        return "\n".join(lines)
+    def uniforms(self, kernel: interface.Interface) -> list[str]:
+        """Return the declarations of what the host sets."""
+        return [f"uniform int {name} = {value};" for name, value in self.numbers_of_host]
 
     def read(self, array: interface.Array, index: Sequence[str], lanes: int) -> str:
         """Return a channel of the image."""
         return f"image[{index[-1]}]"
-
-
-ONE_SAMPLE = (
-    "    const int first_row = 0;",
-    "    const int samples = 1;",
-    "    const uint first_sample = 0u;",
-)
-"""What is a uniform elsewhere."""
-
-NUMBERS = (("width", 512), ("height", 512), ("seed_number", 0))
-"""What a script of Godot sets, with values to start with: the item's size in pixels, a number each frame."""
 
 
 class _GodotPath(_ShadertoyPath):
@@ -268,8 +250,9 @@ void fragment()
     COLOR = wamnet_trace(at, uint(seed_number));
 }"""
     }
-    takes = "ivec2 at, uint seed_value"
-    uniforms_of_host = tuple(f"uniform int {name} = {value};" for name, value in NUMBERS)
+    main = "vec4 wamnet_trace(ivec2 at, uint seed_value)"
+    # What a script sets, with values to start with: the item's size in pixels, a number each frame.
+    numbers_of_host = (("width", 512), ("height", 512), ("seed_number", 0))
 
     def integer(self, kernel: interface.Interface, name: str) -> str:
         """Return the text of an integer that the kernel is given."""

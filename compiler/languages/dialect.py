@@ -223,13 +223,6 @@ class Dialect:
         """Return the text of an integer that the kernel is given."""
         return name
 
-    def results(self, channels: int) -> list[str]:
-        """Return what is written into, in order; a language with one result for all channels has one."""
-        most = self.channels_per_result
-        if most is None or channels <= most:
-            return ["result"]
-        return [f"result_{number}" for number in range(-(-channels // most))]
-
     # ---- words of kernels as data [renderer.py] ------------------------------------------------------------
 
     def arguments(

@@ -214,7 +214,8 @@ class GLSL(Dialect):
     def textures(self, array: Given) -> list[str]:
         """Return the names of an array's textures: planes are four to each."""
         if array.name == RESULT and not array.planes:
-            return self.results(int(array.shape[-1]))
+            count = -(-int(array.shape[-1]) // (self.channels_per_result or self.max_output_channels))
+            return [f"{RESULT}_{number}" for number in range(count)] if count > 1 else [RESULT]
         count = -(-array.planes // self.planes_per_buffer)
         return [f"{array.name}_{number}" for number in range(count)] or [array.name]
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from ..core.profiles import SineContract
-from ..kernel.interface import BLOCK, READ, Array, Interface
+from ..kernel.interface import Interface
 from ..kernel.kernel import Kernel
 from .cuda import GROUPED
 from .dialect import Dialect
@@ -41,6 +41,9 @@ class Metal(Buffers):
     item = ("thread_place.x", "thread_place.y")
     size = "size."
     space = "device "
+    reads = "device const {kind} *{name}"
+    writes = "device {kind} *{name}"
+    block = "constant float *{name}"
     linkage = "static inline "
     mixed_number = "((thread float *){name})[{index}]"
     group = (16, 8)
@@ -82,10 +85,3 @@ class Metal(Buffers):
         listed = ["constant Size &size [[buffer(0)]]", *arrays, *self.threads]
         inside = ",\n".join(f"    {each}" for each in listed)
         return [f"kernel void {self.entries[kernel.role]}(", f"{inside})", "{"]
-
-    def array_argument(self, array: Array) -> str:
-        """Return an argument that is an array, without its number."""
-        if array.home == BLOCK:
-            return f"constant float *{array.name}"
-        kind = "float" if array.lanes == 1 else self.vector_kind(array.dtype, array.lanes)
-        return f"device {'const ' if array.access == READ else ''}{kind} *{array.name}"

@@ -10,7 +10,7 @@ from collections.abc import Sequence
 
 from ..core.profiles import OPENCL_SINE
 from ..kernel.instructions import BUILTINS, OPENCL_GROUP, OPENCL_ROW, OPENCL_TILE
-from ..kernel.interface import BLOCK, ENCODE, INTEGERS, PATH, TRAIN, Array, Interface
+from ..kernel.interface import ENCODE, INTEGERS, PATH, TRAIN, Array, Interface
 from ..kernel.kernel import Kernel
 from .c_path import MASKS
 from .dialect import Dialect
@@ -69,6 +69,7 @@ class OpenCL(Arguments):
     heading = "__kernel void {entry}"
     reads = "__global const {kind} *restrict {name}"
     writes = "__global {kind} *restrict {name}"
+    block = "__constant float *restrict {name} __attribute__((max_constant_size(16 * {array.quads})))"
     numbers = "(__global float *)"
     long = "size_t"
     space = "__global "
@@ -137,13 +138,6 @@ class OpenCL(Arguments):
         """Return what an array is that a kernel is given: a path's sums are as large as the grid of items."""
         own = f"global_size(1) rows of global_size(0) * {self.lanes}"
         return super().about(array).replace("rows rows of width", own)
-
-    def array_argument(self, array: Array) -> str:
-        """Return an argument that is an array."""
-        if array.home == BLOCK:
-            size = f"__attribute__((max_constant_size(16 * {array.quads})))"
-            return f"__constant float *restrict {array.name} {size}"
-        return super().array_argument(array)
 
     def top(self, kernel: Kernel, top: str) -> list[str]:
         """Return the lines above the function."""

@@ -23,10 +23,14 @@ class Buffers(Dialect):
 
     `size`: what is before the name of an integer. `long`: the type of a place in memory, if it is not that
     of other integers. `space`: what is before the type of weights in memory, where pointers have types.
-    `declares_above`: a group's memory is declared above the function.
+    `declares_above`: a group's memory is declared above the function. `reads`, `writes`, `block`: an argument
+    that is an array, by what the kernel does with it, or one in a uniform block.
     """
 
     item: tuple[str, str]
+    reads: str
+    writes: str
+    block: str = ""
     pixel = "image_{image}[({row} * width + {column}) * {channels} + {c}]"
     weight = "weights[{index}]"
     store = "result[({row} * width + {column}) * {channels} + {i}] = {value};"
@@ -172,16 +176,17 @@ class Buffers(Dialect):
         """Return the declaration of an integer, without what ends it."""
         return f"{self.scalars['uint32' if name in UNSIGNED else 'int32']} {name}"
 
+    def array_argument(self, array: Array) -> str:
+        """Return an argument that is an array."""
+        kind = self.scalars[array.dtype] if array.lanes == 1 else self.vector_kind(array.dtype, array.lanes)
+        form = self.block if array.home == BLOCK else self.reads if array.access == READ else self.writes
+        return form.format(kind=kind, name=array.name, array=array)
+
 
 class Arguments(Buffers):
-    """Kernels whose arrays and integers are arguments in a list: `heading` opens it.
-
-    `reads`, `writes`: an argument that is an array, by what the kernel does with it.
-    """
+    """Kernels whose arrays and integers are arguments in a list: `heading` opens it."""
 
     heading: str
-    reads: str
-    writes: str
 
     def head(self, kernel: Interface) -> list[str]:
         """Return the lines of the function up to its brace."""
@@ -209,11 +214,6 @@ class Arguments(Buffers):
         """Return all arguments."""
         arrays = [self.array_argument(array) for array in kernel.arrays]
         return [*arrays, *(self.typed(name) for name in kernel.integers)]
-
-    def array_argument(self, array: Array) -> str:
-        """Return an argument that is an array."""
-        kind = self.scalars[array.dtype] if array.lanes == 1 else self.vector_kind(array.dtype, array.lanes)
-        return (self.reads if array.access == READ else self.writes).format(kind=kind, name=array.name)
 
     def cast(self, dtype: str, text: str) -> str:
         """Return the text of a number converted to another kind."""

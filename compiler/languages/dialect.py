@@ -122,7 +122,6 @@ class Dialect:
     path_lanes: int = 0
     helpers: Mapping[str, str] = {}
     most_numbers: int = 2**16
-    planes_per_buffer: int = 1
     max_planes: int = 2**16
     max_images: int = 2**16
     paints: bool = False
@@ -153,7 +152,6 @@ class Dialect:
     launching: Mapping[str, Any] = {}
     vectors: Type | None = None
     launches: tuple[str, str] = ("", "")
-    followed: str = "item (i, j) follows the pixels from {columns} * i on of row first_row + j"
     declares_memory: bool = False
     is_listing: bool = False
     local_place: tuple[str, str] = ("", "")
@@ -263,7 +261,8 @@ class Dialect:
         said = re.sub(r"ceil\((width|height) / 1\)", r"\1", said)
         if kernel.interface.role != PATH:
             return said
-        return f"{said.replace('height', 'rows')}; {self.followed.format(columns=columns)}"
+        followed = f"item (i, j) follows the pixels from {columns} * i on of row first_row + j"
+        return f"{said.replace('height', 'rows')}; {followed}"
 
     def read(self, array: Array, index: Sequence[str], lanes: int) -> str:
         """Return an element of an array that a kernel is given, or several of a row [`row_reader`]."""

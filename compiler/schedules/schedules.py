@@ -2,10 +2,10 @@
 
 In exact arithmetic a schedule never changes what is computed, only in which order and from where. Most
 reorder and fuse sums, which the bound of every profile allows (spec/profiles.md, PRO-1), so that one bound
-holds for them; one that computes sums in another way states its own [`Schedule.enclosures`]. A target lists
-its schedules as rungs of a ladder, the plain one first [`compile.TARGETS`]; each rung adds one idea to one
-before. A schedule that cannot hold a program says why, and the one that it names instead takes its place, at
-last the plain one, which holds every program [`pick`].
+holds for them; one that computes sums in another way states its own [`Schedule.enclosures`]. A target has
+its schedules by name, as rungs of a ladder, the plain one first [targets.py: LANGUAGES]; each rung adds one
+idea to one before. A schedule that cannot hold a program says why, and the one that it names instead takes
+its place, at last the plain one, which holds every program [`pick`].
 
 The layout of the weights belongs to the schedule: kernels walk through them in order.
 """

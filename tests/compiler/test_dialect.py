@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import subprocess
+import sys
+
 import numpy as np
 import pytest
 from hypothesis import given
@@ -42,3 +45,24 @@ def test_limits_are_those_that_every_device_has():
 def test_negative_constants_stand_in_brackets():
     assert Dialect.literal(-2.0) == "(-2.0f)"
     assert Dialect.literal(3.0) == "3.0f"
+
+
+ASKED = """\
+import sys
+from wamnet.compiler.targets import LANGUAGES, language_named
+def loaded(part):
+    return sorted(m.rpartition(".")[2] for m in sys.modules if m.startswith(f"wamnet.compiler.{part}."))
+print(loaded("languages"), loaded("schedules"))
+assert {"c", "cuda", "wgsl"} < set(LANGUAGES)
+language_named("cuda").schedules["plain"]
+print("opencl" in loaded("languages"), "fft" in loaded("schedules"), "cuda" in loaded("languages"))
+"""
+
+
+def test_a_language_and_a_schedule_are_imported_when_they_are_asked_for():
+    """Whoever compiles for one target waits for no other one's words, and reads none."""
+    done = subprocess.run([sys.executable, "-c", ASKED], capture_output=True, text=True, check=True)
+    assert done.stdout.splitlines() == [
+        "['dialect', 'renderer'] ['common', 'names', 'schedules']",
+        "False False True",
+    ]

@@ -30,7 +30,7 @@ from wamnet.refimpl.network.denoise import Model
 network = siren.init((3, 80_000, 3), 2.0, 2.0, 5, np.float32)
 model = Model(network, ("color",), Window(1, "clamp"), Normalization(), {})
 with kernels.open_executor(sys.argv[1]) as executor:
-    kernel = compile_program(lower(model), sys.argv[1], "native")
+    kernel = compile_program(lower(model), executor.language.under("native"))
     executor.run(kernel, {"color": np.zeros((2, 3, 3), np.float32)})
 """
 """A kernel whose arrays take 320 kB of a thread's stack."""

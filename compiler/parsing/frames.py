@@ -30,7 +30,7 @@ from ..kernel.instructions import (
     WGSL_GROUP,
     c_vectors,
 )
-from ..kernel.interface import ITEMS
+from ..kernel.interface import BATCH, ITEMS
 
 COMMENT = re.compile(r"/\*.*?\*/", re.S)
 """What becomes a blank."""
@@ -58,16 +58,15 @@ OPEN: Mapping[str, str] = {
     "lanes": r"(?P<lanes>\d+)", "same_lanes": r"(?P=lanes)",
     "dropped": r"(?:#undef wamnet_(?:difference|scaled|sum|zero)\n)*",
     "body": r"(?P<body>.*\n)?",
-    "memory": r"(?P<memory>(?:layout\(std430, binding = \d+\) restrict buffer \w+ \{ vec2 \w+\[\]; \};\n)+)",
-    "wgsl_memory": r"(?P<memory>(?:@group\(0\) [^\n]+ \w+: array<vec2<f32>>;\n)+)",
-    "launches": r"(?P<launches>#if STAGE == 0\n.*)",
-    "wgsl_launches": r"(?P<launches>@compute @workgroup_size\(\d, 1\)\nfn main_0\(.*)",
+    "memory": r"(?P<memory>(?:[^\n]*(?:vec|float)2\b[^\n]*\n)+)",
+    "head": r"(?P<head>",
+    "launches": r"(?P<launches>.*)",
 }  # fmt: skip
 """The open places by name; `@each LINE@` are lines, one for each image."""
 
 BLOCKS = (
     "constants", "wgsl_constants", "functions", "undefined", "images", "body", "bounded", "words", "gnu",
-    "dropped", "memory", "wgsl_memory", "launches", "wgsl_launches", *"(|)<>",
+    "dropped", "memory", "launches", *"(|)<>",
 )  # fmt: skip
 """Places that match whole lines or nothing: the newline behind the marker is not part of the pattern."""
 
@@ -99,9 +98,9 @@ def begun(thread: Two, local: Two, group: Two, size: str = "", own: Two = ("", "
     return "@<@{}\n@|@@group@{}\n@>@".format(*both)
 
 
-def read_size(index: str, of: str) -> str:
-    """Return how an item gets the image's size from a block."""
-    return "\n".join(index.format(each, f"{of}{each}") for each in ("width", "height"))
+def read_size(index: str, of: str, more: tuple[str, ...] = ()) -> str:
+    """Return how an item gets the image's size, and `more`, from a block."""
+    return "\n".join(index.format(each, f"{of}{each}") for each in ("width", "height", *more))
 
 
 ARGUMENTS = """
@@ -164,36 +163,18 @@ SIZE = "int width = textureSize(@first@, 0).x;\nint height = textureSize(@same_f
 EXTENSION = "\n".join(VULKAN_EXTENSION)
 """Products of bytes in Vulkan GLSL."""
 
-STAGE = r"""#(?:if|elif) STAGE == (?P<number>\d+)
-void main\(\)
-\{{
-{}int (?P<column>tile) = int\(gl_GlobalInvocationID\.x\);
-int (?P<row>line) = int\({}\.y\);
-(?P<body>(?:[^#\n][^\n]*\n)*?)\}}
-(?=#|\Z)"""
-"""A launch of passes, each a program that is compiled by its number: the image's size, and an item's row."""
+STAGE = """@head@#if STAGE == 0
+void main()
+{{
+{}int tile = int(gl_GlobalInvocationID.x);
+int line = int({}.y);
+@>@
+@launches@
+#endif"""
+"""The first of a source's launches, each a program that is compiled by its number [launches.py]."""
 
-SIZES = r"int width = imageSize\(result\)\.x;" "\n" r"int height = imageSize\(result\)\.y;" "\n"
+SIZES = "int width = imageSize(result).x;\nint height = imageSize(result).y;\n"
 """The image's size in launches whose images are textures."""
-
-ENTRY = rf"""@compute @workgroup_size\({ITEMS}, 1\)
-fn main_(?P<number>\d+)\(@builtin\(global_invocation_id\) invocation: vec3<u32>\) \{{
-let width: i32 = size\.width;
-let height: i32 = size\.height;
-let first_tile: i32 = size\.first_tile;
-let tile_count: i32 = size\.tile_count;
-let (?P<column>tile): i32 = i32\(invocation\.x\);
-let (?P<row>line): i32 = i32\(invocation\.y\);
-(?P<body>(?:[^@\n][^\n]*\n)*?)\}}
-(?=@|\Z)"""
-"""The same in WGSL, an entry point."""
-
-LAUNCHES = {
-    "vec2": re.compile(STAGE.format("", "gl_GlobalInvocationID")),
-    "vec2<f32>": re.compile(ENTRY),
-    "texels": re.compile(STAGE.format(SIZES, "gl_WorkGroupID")),
-}
-"""The launches by the type of what they leave to each other, and of a language whose images are textures."""
 
 FRAMES: dict[str, str] = {
     "c": f"""
@@ -300,7 +281,7 @@ static __device__ inline {CLAMP}
 @)@
 @constants@
 @functions@
-@<@extern "C" __global__ void wamnet_denoise(
+@<@@<@extern "C" __global__ void wamnet_denoise(
 @|@@group@extern "C" __global__ void __launch_bounds__(GROUP_WIDTH * GROUP_HEIGHT) wamnet_denoise(
 @>@
 @each const float *__restrict__ IMAGE,@
@@ -322,6 +303,22 @@ int height)
     }
 @body@
 }}
+@|@@passes@@head@extern "C" __global__ void wamnet_denoise_0(
+@each const float *__restrict__ IMAGE,@
+const float *__restrict__ weights,
+float *__restrict__ result,
+@memory@
+int width,
+int height,
+int first_tile,
+int tile_count)
+{{
+const @vector@ *w = (const @same_vector@ *)weights;
+int tile = (int)(blockIdx.x * blockDim.x + threadIdx.x);
+int line = (int)(blockIdx.y * blockDim.y + threadIdx.y);
+@>@
+@launches@
+@>@
 """,
     "metal": f"""
 #include <metal_stdlib>
@@ -331,8 +328,11 @@ using namespace metal;
 struct Size {{
 int width;
 int height;
+@(@@passes@int first_tile;
+int tile_count;
+@)@
 }};
-kernel void wamnet_denoise(
+@<@kernel void wamnet_denoise(
 constant Size &size [[buffer(0)]],
 device const float *weights [[buffer(1)]],
 device float *result [[buffer(2)]],
@@ -356,6 +356,21 @@ uint2 group_place [[threadgroup_position_in_grid]])
     }
 @body@
 }}
+@|@@head@kernel void wamnet_denoise_0(
+constant Size &size [[buffer(0)]],
+device const float *weights [[buffer(1)]],
+device float *result [[buffer(2)]],
+@each device const float *IMAGE [[buffer(NUMBER)]],@
+@memory@
+uint2 thread_place [[thread_position_in_grid]])
+{{
+device const @vector@ *w = (device const @same_vector@ *)weights;
+{read_size("int {} = {};", "size.", BATCH)}
+int tile = int(thread_place.x);
+int line = int(thread_place.y);
+@>@
+@launches@
+@>@
 """,
     "opengl": f"""
 @<@#version 330 core
@@ -388,8 +403,7 @@ void main()
 @|@@memory@
 uniform int first_tile;
 uniform int tile_count;
-@launches@
-#endif
+{STAGE.format(SIZES, "gl_WorkGroupID")}
 @>@
 @>@
 """,
@@ -432,8 +446,7 @@ layout(std430, binding = 2) restrict buffer Result {{ float result[]; }};
 @body@
 }}
 @|@@memory@
-@launches@
-#endif
+{STAGE.format("", "gl_GlobalInvocationID")}
 @>@
 """,
     "wgsl": f"""
@@ -472,8 +485,14 @@ fn main($builtin(local_invocation_id) item_place: vec3<u32>, $builtin(workgroup_
     }
 @body@
 }}
-@|@@wgsl_memory@
-@wgsl_launches@
+@|@@memory@
+@head@$compute $workgroup_size({ITEMS}, 1)
+fn main_0($builtin(global_invocation_id) invocation: vec3<u32>) {{
+{read_size("let {}: i32 = {};", "size.", BATCH)}
+let tile: i32 = i32(invocation.x);
+let line: i32 = i32(invocation.y);
+@>@
+@launches@
 @>@
 """,
 }

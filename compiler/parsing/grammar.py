@@ -76,7 +76,8 @@ class Language:
     """The words of a language: types, functions, a barrier; `qualifier`: one that changes no value.
 
     `makers`: what makes a vector of values; `function`: the words before a function's type; `number`: those
-    before a vector's address as that of its components; `operators`: vectors have those of numbers.
+    before a vector's address as that of its components; `operators`: vectors have those of numbers;
+    `launch`: the words before a launch's number; `memory`: the line of an array that launches hand on.
     """
 
     types: Mapping[str, Type]
@@ -90,6 +91,8 @@ class Language:
     function: tuple[str, ...] = ()
     number: tuple[str, ...] = ()
     operators: bool = True
+    launch: str = ""
+    memory: str = ""
 
 
 COMPARED = {
@@ -110,6 +113,8 @@ BUFFERS = Language(
     qualifier="PRECISE",
     casts=False,
     makers={"ivec4": INT.of(4), **{f"vec{n}": FLOAT.of(n) for n in (2, 3, 4)}},
+    launch="STAGE == ",
+    memory="layout(std430, binding = {0}) restrict buffer {2} {{ vec2 {1}[]; }};",
 )
 """GLSL of compute shaders."""
 
@@ -125,23 +130,28 @@ LANGUAGES: Mapping[str, Language] = {
         "barrier(CLK_LOCAL_MEM_FENCE)",
     ),
     "cuda": Language(
-        {**C_TYPES, "unsigned int": Type("uint32"), "wamnet_vector": FLOAT.of(4), "int4": INT.of(4)},
+        {**C_TYPES, "unsigned int": Type("uint32"), "int4": INT.of(4)}
+        | {"wamnet_vector": FLOAT.of(4), "float2": FLOAT.of(2)},
         {**C_CALLS, **LEAST_MOST, "fminf": "minimum", "fmaxf": "maximum", **DOTS},
         "__syncthreads()",
-        makers={"wamnet_made": FLOAT.of(4), "make_int4": INT.of(4)},
+        makers={"wamnet_made": FLOAT.of(4), "make_int4": INT.of(4), "make_float2": FLOAT.of(2)},
         function=("static", "__device__", "inline"),
         number=("float", "*"),
         operators=False,
+        launch="wamnet_denoise_",
+        memory="float2 *__restrict__ {1},",
     ),
     "metal": Language(
-        {**C_TYPES, "uint": Type("uint32"), "float4": FLOAT.of(4)},
+        {**C_TYPES, "uint": Type("uint32"), "float2": FLOAT.of(2), "float4": FLOAT.of(4)},
         {**COMMON, **LEAST_MOST, "fabs": "absolute", "pow": "power", "clamp": "clamp"},
         "threadgroup_barrier(mem_flags::mem_threadgroup)",
-        makers={"float4": FLOAT.of(4)},
+        makers={"float2": FLOAT.of(2), "float4": FLOAT.of(4)},
         function=("static", "inline"),
         number=("thread", "float", "*"),
+        launch="wamnet_denoise_",
+        memory="device float2 *{1} [[buffer({0})]],",
     ),
-    "opengl": replace(BUFFERS, texels=True),
+    "opengl": replace(BUFFERS, texels=True, memory=BUFFERS.memory.replace("{2}", "{1}_buffer")),
     "glsl-es": replace(BUFFERS, texels=True),
     "glsl-vulkan": BUFFERS,
     "glsl-compute": BUFFERS,
@@ -153,6 +163,8 @@ LANGUAGES: Mapping[str, Language] = {
         casts=False,
         lets=True,
         makers={"vec2<f32>": FLOAT.of(2), "vec4<f32>": FLOAT.of(4), "vec4<i32>": INT.of(4)},
+        launch="main_",
+        memory="@group(0) @binding({0}) var<storage, read_write> {1}: array<vec2<f32>>;",
     ),
 }
 """The languages by target."""

@@ -473,7 +473,10 @@ class Parser(Expressions):
         product = product and not any(map(rounds, value.args))
         if not (product and LAYER.fullmatch(target.value)):
             self._check_order(target.value, value, word, sign != "=")
-        if sign == "-=" or (sign == "+=" and target.type.dtype != "float32"):
+        defined = sign == "+=" and target.type.dtype == "float32"
+        if not self.language.operators:  # CUDA, whose frame defines both for one type
+            defined = target.type == self.types["wamnet_vector"]
+        if sign != "=" and not defined:
             self._check_vectors(sign, value)
         if summed and self.by_calls and sign == "=":
             sign, value = {"add": "+=", "subtract": "-="}[value.op], value.args[1]

@@ -273,8 +273,8 @@ def check_interface(kernel: Kernel, claim: Claim, manifest: Any) -> None:
     if (group and tuple(group)) != size:
         raise Wrong(f"its groups are not of {' x '.join(map(str, group or ['no']))} items")
     stated = [schedule.get(key, ()) for key in ("arrays", "entries")]
-    # In WGSL each launch is an entry point, in other languages the program is compiled for each.
-    point, of_each = manifest["entry_point"], manifest["target"] == "wgsl"
+    # In GLSL the program is compiled for each launch, in other languages each is an entry point.
+    point, of_each = manifest["entry_point"], "STAGE" not in LANGUAGES[manifest["target"]].launch
     for number, (launch, arrays, entry) in enumerate(zip(kernel.launches, *stated, strict=True)):
         every = walk(launch.body)
         used = {s.array for s in every if isinstance(s, Store)}

@@ -12,12 +12,11 @@ TITLES: Mapping[str, str] = {
 """What a language's name in manifests begins with."""
 
 BUFFERS = dict.fromkeys(("glsl-vulkan", "wgsl", "cuda", "metal"), ("group", "tile"))
-"""Languages of which work groups and register tiles are read."""
+"""Languages of which work groups and register tiles are read, and of floats FFT passes."""
 
 OF_FLOATS: Mapping[str, tuple[str, ...]] = {
-    **BUFFERS, "opencl": ("tile", "vector", "group", "fft"), "c": ("tile", "fft"), "glsl-es": ("packed",),
-    "opengl": ("group", "fftpasses"), "glsl-vulkan": ("group", "tile", "fftpasses"),
-    "wgsl": ("group", "tile", "fftpasses"),
+    **dict.fromkeys(BUFFERS, ("group", "tile", "fftpasses")), "opengl": ("group", "fftpasses"),
+    "opencl": ("tile", "vector", "group", "fft"), "c": ("tile", "fft"), "glsl-es": ("packed",),
 }  # fmt: skip
 """What the names of schedules other than plain begin with, of networks of floats."""
 

@@ -13,8 +13,10 @@ from wamnet.compiler import artifact, targets
 from wamnet.compiler.compile import compile_program
 from wamnet.compiler.core.lower import lower
 from wamnet.compiler.languages.c import C
+from wamnet.compiler.languages.cuda import CUDA
 from wamnet.compiler.languages.glsl import GLSLCompute
 from wamnet.compiler.languages.glsl_buffers import Vulkan
+from wamnet.compiler.languages.metal import Metal
 from wamnet.compiler.languages.opencl import OpenCL
 from wamnet.compiler.languages.wgsl import WGSL
 from wamnet.compiler.proof import checker, spectra_checker
@@ -28,6 +30,9 @@ from wamnet.refimpl.network import siren
 from wamnet.refimpl.network.dataset import Normalization
 from wamnet.refimpl.network.denoise import Model
 from wamnet.refimpl.network.window import Window
+
+IN_PASSES = {"opengl": GLSLCompute, "glsl-vulkan": Vulkan, "wgsl": WGSL, "cuda": CUDA, "metal": Metal}
+"""Languages of the schedule in passes."""
 
 FLOATS = Arithmetic(operator.add, operator.sub, operator.mul, float)
 
@@ -43,7 +48,7 @@ def kernel(folder, target="opencl", points=8, tiles=2, **kwargs):
     """Write a kernel of small tiles, by vectors of 4 numbers and blocks of 6 pixels."""
     dialect = OpenCL() if target == "opencl" else C()
     tiny = fft.Fourier(dialect, "fft8", "small tiles", lanes=4, pixels=6, points=points, tiles=tiles)
-    if words := {"opengl": GLSLCompute, "glsl-vulkan": Vulkan, "wgsl": WGSL}.get(target):
+    if words := IN_PASSES.get(target):
         tiny = FourierPasses(words(), "fftpasses:8", "small tiles", points=points)
     whole = targets.LANGUAGES[target]
     with pytest.MonkeyPatch.context() as patch:
@@ -222,7 +227,8 @@ def test_a_text_is_held_against_what_its_certificate_says(opencl, place, value):
 FAULTS = json.loads(Path(__file__).with_name("spectra_faults.json").read_text())
 """What a person who edits a transform, a product, a tile or a manifest may do wrong.
 
-Of texts: what, the targets that have the text, which text, and what instead; of hosts: what, which launches,
+Of texts: what, the targets that have the text, which text, and what instead; of entry points: by target,
+which text, and what instead; of hosts: what, which launches,
 the number of one, its key, and by how much.
 """
 
@@ -252,28 +258,29 @@ def wgsl(tmp_path_factory):
     return parts(kernel(tmp_path_factory.mktemp("wgsl"), "wgsl"))
 
 
+@pytest.fixture(scope="module")
+def cuda(tmp_path_factory):
+    return parts(kernel(tmp_path_factory.mktemp("cuda"), "cuda"))
+
+
+@pytest.fixture(scope="module")
+def metal(tmp_path_factory):
+    return parts(kernel(tmp_path_factory.mktemp("metal"), "metal"))
+
+
+@pytest.mark.parametrize("target", ["wgsl", "cuda", "metal"])
+def test_passes_may_be_entry_points(target, request):
+    """TXT-12: each launch is one, of the manifest's name; each has the memory between them."""
+    assert run_text(*request.getfixturevalue(target))["sums"] == 3 * 36
+
+
 @pytest.mark.parametrize(
-    ("old", "new"),
-    [
-        ("+ line - WINDOW_CENTRE", "+ line"),
-        ("first_tile: i32,\n    tile_count: i32,", "tile_count: i32,\n    first_tile: i32,"),
-        ("let first_tile: i32 = size.first_tile;", "let first_tile: i32 = size.tile_count;"),
-        ("let line: i32 = i32(invocation.y);", "let line: i32 = i32(invocation.z);"),
-        ("@workgroup_size(8, 1)", "@workgroup_size(4, 1)"),
-        ("fn main_1(", "fn main_6("),
-        ("var<storage, read_write> back", "var<storage, read> back"),
-        ("@binding(8)", "@binding(18)"),
-        ("> columns: array<vec2<f32>>;", "> columns: array<vec4<f32>>;"),
-        ("@compute", "var<private> p: f32;\n@compute"),
-        ("] = vec2<f32>(t", "] = -vec2<f32>(t"),
-        (".x - whole_imaginary", ".x + whole_imaginary"),
-    ],
+    ("target", "old", "new"),
+    [(target, *each) for target, faults in FAULTS["entries"].items() for each in faults],
 )
-def test_passes_of_wgsl_are_entry_points(wgsl, old, new):
-    """TXT-12: each launch is one, of the manifest's name; the memory between them is storage buffers."""
-    assert run_text(*wgsl)["sums"] == 3 * 36
+def test_wrong_entry_points_are_refused(target, old, new, request):
     with pytest.raises((Refused, Unread), match=r"\S"):
-        run_text(*changed(wgsl, old, new))
+        run_text(*changed(request.getfixturevalue(target), old, new))
 
 
 @pytest.mark.nightly(but=USUAL)

@@ -50,7 +50,7 @@ from wamnet.refimpl.encoding import to_display
 from wamnet.refimpl.errors import InputError
 from wamnet.refimpl.frame import SUN, Floats, Frame
 from wamnet.refimpl.network.denoise import Model
-from wamnet.refimpl.network.train import BEST, MIRRORS, SHADOWS, SHORT, SKY, Recipe
+from wamnet.refimpl.network.train import BEST, MIRROR_SHADOWS, MIRRORS, SHADOWS, SHORT, SKY, Recipe
 from wamnet.refimpl.network.window import Window
 from wamnet_peers.peer_oidn import filtered, prefiltered
 
@@ -103,6 +103,9 @@ SLOWER = replace(NARROW, steps=60_000, learning_rate=5e-4)
 SMOOTH = replace(MIRRORS, features=MIRRORS.features[:-1])
 """The preset for mirrors without what is seen emits."""
 
+FIVE = (*PAST, "seen_direct")
+"""Layers that the page and each target can make and read; bounds of a network of them are below 1 / 255."""
+
 RECIPES: Mapping[str, Recipe] = {
     "short": SHORT,
     "best": BEST,
@@ -120,6 +123,8 @@ RECIPES: Mapping[str, Recipe] = {
     "smooth-slow": replace(SMOOTH, steps=120_000),
     "lit": MIRRORS,
     "lit-slow": replace(MIRRORS, steps=120_000),
+    "lit-shadows": MIRROR_SHADOWS,
+    "five-shadows": replace(MIRROR_SHADOWS, features=FIVE),
     "lit7": replace(MIRRORS, window=SKY.window),
     "sun48": replace(SKY, widths=(48,) * 4),
     "sun": SKY,
@@ -187,6 +192,10 @@ ROWS: Mapping[str, Row] = {
     "smooth-slow-16": Row("four times the steps, plus filtered colour", RAYS, "smooth-slow", past=True),
     "lit-16": Row("filtered colour, plus visible emission (preset `mirrors`)", RAYS, "lit", past=True),
     "lit-slow-16": Row("the same, four times the steps", RAYS, "lit-slow", past=True),
+    "lit-shadows-16": Row("`mirrors` plus direct light of shadow rays (preset `mirrors-shadows`)",
+        RAYS, "lit-shadows", past=True, shadow_rays=1),
+    "five-shadows-16": Row("direct light and layers past mirrors and glass (the bundled `glossy`)",
+        RAYS, "five-shadows", past=True, shadow_rays=1),
     "lit7-16": Row("preset `mirrors` with a 7x7 window", RAYS, "lit7", past=True),
     "sun-16": Row("7x7 window, plus sun direction (preset `sky`)", RAYS, "sun", past=True),
     "sun48-16": Row("the same, 48 neurons per layer", RAYS, "sun48", past=True),

@@ -21,6 +21,7 @@ from wamnet.compiler.compile import compile_plan, compile_program
 from wamnet.compiler.core.ir import Program
 from wamnet.compiler.core.lower import lower
 from wamnet.compiler.plan import plan_program
+from wamnet.compiler.scenes.encode_kernel import sees
 from wamnet.compiler.targets import DENOISERS, LANGUAGES
 from wamnet.kernels import denoise_on
 from wamnet.kernels.run.denoise_on import images_of
@@ -86,7 +87,8 @@ def shown(model: Model) -> Frame:
     """Return a noisy frame of the scene that a model is for, rendered as those that it has learned from."""
     settings = Settings(max_depth=int(first_of(model, "max_depth", str(Settings().max_depth))))
     spp, rays = (int(first_of(model, name, "1")) for name in ("spp", "feature_spp"))
-    job = Job(WIDTH, HEIGHT, spp, SEED, settings, feature_spp=rays, shadow_rays=learned_shadow_rays(model))
+    more = {"shadow_rays": learned_shadow_rays(model), "seen": sees(model.features)}
+    job = Job(WIDTH, HEIGHT, spp, SEED, settings, feature_spp=rays, **more)
     return render_frame("numpy", unseen(model), job).frame
 
 

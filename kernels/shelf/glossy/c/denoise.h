@@ -1,30 +1,32 @@
 /*
  * wamnet denoiser, C99. Generated: change the compiler, not this text.
- * program   c5d2946025eb9ef99580d499bf5859fb
+ * program   49003e6e13e3c3310d2686bcb568ae06
  * images    color: 3 channels in [0.0, 1.0], sRGB of (linear radiance * 2^0.0) clipped to 0 .. 1 (IEC 61966-2-1)
- *           normal: 3 channels in [-1.0, 1.0], unit normal in world space towards the ray's origin, mean over samples; 0 where nothing is hit
- *           albedo: 3 channels in [0.0, 1.0], linear reflectance clipped to 0 .. 1, mean over samples; 0 where nothing is hit
- *           position: 3 channels in [-1.0, 1.0], (world position - (0.0, -0.3406454920768738, -0.09019696712493896)) / 2.0, clipped to -1 .. 1; a miss is at 0
- * window    12 x 12 pixels, the pixel itself is tap 6
+ *           seen_normal: 3 channels in [-1.0, 1.0], past mirrors and glass: unit normal in world space towards the ray's origin, mean over samples; 0 where nothing is hit
+ *           seen_albedo: 3 channels in [0.0, 1.0], past mirrors and glass: linear reflectance clipped to 0 .. 1, mean over samples; 0 where nothing is hit
+ *           seen_position: 3 channels in [-1.0, 1.0], past mirrors and glass: (world position - (0.0, -1.1920928955078125e-07, -1.1920928955078125e-07)) / 2.0000003576278687, clipped to -1 .. 1; a miss is at 0
+ *           seen_direct: 3 channels in [0.0, 1.0], past mirrors and glass: emission, and unshadowed with its shadows: sRGB of (linear radiance * 2^0.0) clipped to 0 .. 1 (IEC 61966-2-1)
+ * window    8 x 8 pixels, the pixel itself is tap 4
  * border    clamp
  * output    3 channels, sRGB of (linear radiance * 2^0.0) clipped to 0 .. 1 (IEC 61966-2-1)
  * profile   ieee: any order of summation, fused multiply-add allowed, emitted sine
  * sine      emitted, odd polynomial of degree 11
- * bound     |output - float64 reference| <= 0.00195 for all images in these ranges
+ * bound     |output - float64 reference| <= 0.00201 for all images in these ranges
  * sums      over the window: a partial sum for each image and row of taps, in any order; then these
  * arguments image_color: width * height * 3 floats, rows from the top, channels interleaved;
- *           image_normal: width * height * 3 floats, rows from the top, channels interleaved;
- *           image_albedo: width * height * 3 floats, rows from the top, channels interleaved;
- *           image_position: width * height * 3 floats, rows from the top, channels interleaved;
- *           weights: 58595 floats;
+ *           image_seen_normal: width * height * 3 floats, rows from the top, channels interleaved;
+ *           image_seen_albedo: width * height * 3 floats, rows from the top, channels interleaved;
+ *           image_seen_position: width * height * 3 floats, rows from the top, channels interleaved;
+ *           image_seen_direct: width * height * 3 floats, rows from the top, channels interleaved;
+ *           weights: 74179 floats;
  *           result: width * height * 3 floats, rows from the top, channels interleaved, encoded as `output`
  *           says;
  *           width; height.
  *           wamnet_image does all pixels, wamnet_pixel one: call that from your own loops
- *           fewer than 2^31 floats an image; stack: 9956 bytes at most, without optimisation too
- * weights   W0 (1728 x 32) at 0, b0 (32) at 55296, W1 (32 x 32) at 55328, b1 (32) at 56352, W2 (32 x
- *           32) at 56384, b2 (32) at 57408, W3 (32 x 32) at 57440, b3 (32) at 58464, W4 (32 x 3) at
- *           58496, b4 (3) at 58592; matrices input-major: D_in x D_out, in C order
+ *           fewer than 2^31 floats an image; stack: 11684 bytes at most, without optimisation too
+ * weights   W0 (960 x 64) at 0, b0 (64) at 61440, W1 (64 x 64) at 61504, b1 (64) at 65600, W2 (64 x
+ *           64) at 65664, b2 (64) at 69760, W3 (64 x 64) at 69824, b3 (64) at 73920, W4 (64 x 3) at
+ *           73984, b4 (3) at 74176; matrices input-major: D_in x D_out, in C order
  */
 #ifndef WAMNET_DENOISE_H
 #define WAMNET_DENOISE_H
@@ -47,14 +49,15 @@
 #else
 #pragma STDC FP_CONTRACT OFF
 #endif
-#define WINDOW_SIZE 12
-#define WINDOW_CENTRE 6 /* the tap that lies on the pixel itself */
+#define WINDOW_SIZE 8
+#define WINDOW_CENTRE 4 /* the tap that lies on the pixel itself */
 /* One pixel (x, y): its channels are written to `result`, the whole picture's array. */
 static inline void wamnet_pixel(
     const float *restrict image_color,
-    const float *restrict image_normal,
-    const float *restrict image_albedo,
-    const float *restrict image_position,
+    const float *restrict image_seen_normal,
+    const float *restrict image_seen_albedo,
+    const float *restrict image_seen_position,
+    const float *restrict image_seen_direct,
     const float *restrict weights,
     float *restrict result,
     int width,
@@ -65,9 +68,10 @@ static inline void wamnet_pixel(
 /* All pixels, one after another. */
 static inline void wamnet_image(
     const float *restrict image_color,
-    const float *restrict image_normal,
-    const float *restrict image_albedo,
-    const float *restrict image_position,
+    const float *restrict image_seen_normal,
+    const float *restrict image_seen_albedo,
+    const float *restrict image_seen_position,
+    const float *restrict image_seen_direct,
     const float *restrict weights,
     float *restrict result,
     int width,
@@ -75,7 +79,7 @@ static inline void wamnet_image(
 {
     for (int y = 0; y < height; ++y) {
         for (int x = 0; x < width; ++x) {
-            wamnet_pixel(image_color, image_normal, image_albedo, image_position, weights, result, width, height, x, y);
+            wamnet_pixel(image_color, image_seen_normal, image_seen_albedo, image_seen_position, image_seen_direct, weights, result, width, height, x, y);
         }
     }
 }
@@ -87,9 +91,10 @@ static inline int wamnet_clamp(int value, int low, int high)
 
 static inline void wamnet_pixel(
     const float *restrict image_color,
-    const float *restrict image_normal,
-    const float *restrict image_albedo,
-    const float *restrict image_position,
+    const float *restrict image_seen_normal,
+    const float *restrict image_seen_albedo,
+    const float *restrict image_seen_position,
+    const float *restrict image_seen_direct,
     const float *restrict weights,
     float *restrict result,
     int width,
@@ -99,92 +104,111 @@ static inline void wamnet_pixel(
 {
     (void)weights;
 
-    /* %1: affine map W0 from 1728 to 32 */
-    float v1[32];
-    for (int j = 0; j < 32; ++j) {
-        v1[j] = weights[55296 + j];
+    /* %1: affine map W0 from 960 to 64 */
+    float v1[64];
+    for (int j = 0; j < 64; ++j) {
+        v1[j] = weights[61440 + j];
     }
-    float part1[32];
+    float part1[64];
     for (int dy = 0; dy < WINDOW_SIZE; ++dy) {
         int row = wamnet_clamp(y + dy - WINDOW_CENTRE, 0, height - 1);
-        for (int j = 0; j < 32; ++j) {
+        for (int j = 0; j < 64; ++j) {
             part1[j] = 0.0f;
         }
         for (int dx = 0; dx < WINDOW_SIZE; ++dx) {
             int column = wamnet_clamp(x + dx - WINDOW_CENTRE, 0, width - 1);
-            int tap = (dy * WINDOW_SIZE + dx) * 12;
+            int tap = (dy * WINDOW_SIZE + dx) * 15;
             for (int c = 0; c < 3; ++c) {
                 float value = image_color[(row * width + column) * 3 + c];
-                for (int j = 0; j < 32; ++j) {
-                    part1[j] += weights[(tap + c) * 32 + j] * value;
+                for (int j = 0; j < 64; ++j) {
+                    part1[j] += weights[(tap + c) * 64 + j] * value;
                 }
             }
         }
-        for (int j = 0; j < 32; ++j) {
+        for (int j = 0; j < 64; ++j) {
             v1[j] += part1[j];
         }
     }
     for (int dy = 0; dy < WINDOW_SIZE; ++dy) {
         int row = wamnet_clamp(y + dy - WINDOW_CENTRE, 0, height - 1);
-        for (int j = 0; j < 32; ++j) {
+        for (int j = 0; j < 64; ++j) {
             part1[j] = 0.0f;
         }
         for (int dx = 0; dx < WINDOW_SIZE; ++dx) {
             int column = wamnet_clamp(x + dx - WINDOW_CENTRE, 0, width - 1);
-            int tap = (dy * WINDOW_SIZE + dx) * 12;
+            int tap = (dy * WINDOW_SIZE + dx) * 15;
             for (int c = 0; c < 3; ++c) {
-                float value = image_normal[(row * width + column) * 3 + c];
-                for (int j = 0; j < 32; ++j) {
-                    part1[j] += weights[(tap + 3 + c) * 32 + j] * value;
+                float value = image_seen_normal[(row * width + column) * 3 + c];
+                for (int j = 0; j < 64; ++j) {
+                    part1[j] += weights[(tap + 3 + c) * 64 + j] * value;
                 }
             }
         }
-        for (int j = 0; j < 32; ++j) {
+        for (int j = 0; j < 64; ++j) {
             v1[j] += part1[j];
         }
     }
     for (int dy = 0; dy < WINDOW_SIZE; ++dy) {
         int row = wamnet_clamp(y + dy - WINDOW_CENTRE, 0, height - 1);
-        for (int j = 0; j < 32; ++j) {
+        for (int j = 0; j < 64; ++j) {
             part1[j] = 0.0f;
         }
         for (int dx = 0; dx < WINDOW_SIZE; ++dx) {
             int column = wamnet_clamp(x + dx - WINDOW_CENTRE, 0, width - 1);
-            int tap = (dy * WINDOW_SIZE + dx) * 12;
+            int tap = (dy * WINDOW_SIZE + dx) * 15;
             for (int c = 0; c < 3; ++c) {
-                float value = image_albedo[(row * width + column) * 3 + c];
-                for (int j = 0; j < 32; ++j) {
-                    part1[j] += weights[(tap + 6 + c) * 32 + j] * value;
+                float value = image_seen_albedo[(row * width + column) * 3 + c];
+                for (int j = 0; j < 64; ++j) {
+                    part1[j] += weights[(tap + 6 + c) * 64 + j] * value;
                 }
             }
         }
-        for (int j = 0; j < 32; ++j) {
+        for (int j = 0; j < 64; ++j) {
             v1[j] += part1[j];
         }
     }
     for (int dy = 0; dy < WINDOW_SIZE; ++dy) {
         int row = wamnet_clamp(y + dy - WINDOW_CENTRE, 0, height - 1);
-        for (int j = 0; j < 32; ++j) {
+        for (int j = 0; j < 64; ++j) {
             part1[j] = 0.0f;
         }
         for (int dx = 0; dx < WINDOW_SIZE; ++dx) {
             int column = wamnet_clamp(x + dx - WINDOW_CENTRE, 0, width - 1);
-            int tap = (dy * WINDOW_SIZE + dx) * 12;
+            int tap = (dy * WINDOW_SIZE + dx) * 15;
             for (int c = 0; c < 3; ++c) {
-                float value = image_position[(row * width + column) * 3 + c];
-                for (int j = 0; j < 32; ++j) {
-                    part1[j] += weights[(tap + 9 + c) * 32 + j] * value;
+                float value = image_seen_position[(row * width + column) * 3 + c];
+                for (int j = 0; j < 64; ++j) {
+                    part1[j] += weights[(tap + 9 + c) * 64 + j] * value;
                 }
             }
         }
-        for (int j = 0; j < 32; ++j) {
+        for (int j = 0; j < 64; ++j) {
+            v1[j] += part1[j];
+        }
+    }
+    for (int dy = 0; dy < WINDOW_SIZE; ++dy) {
+        int row = wamnet_clamp(y + dy - WINDOW_CENTRE, 0, height - 1);
+        for (int j = 0; j < 64; ++j) {
+            part1[j] = 0.0f;
+        }
+        for (int dx = 0; dx < WINDOW_SIZE; ++dx) {
+            int column = wamnet_clamp(x + dx - WINDOW_CENTRE, 0, width - 1);
+            int tap = (dy * WINDOW_SIZE + dx) * 15;
+            for (int c = 0; c < 3; ++c) {
+                float value = image_seen_direct[(row * width + column) * 3 + c];
+                for (int j = 0; j < 64; ++j) {
+                    part1[j] += weights[(tap + 12 + c) * 64 + j] * value;
+                }
+            }
+        }
+        for (int j = 0; j < 64; ++j) {
             v1[j] += part1[j];
         }
     }
 
-    /* %4 to %49: elementwise on 32 numbers */
-    float v49[32];
-    for (int i = 0; i < 32; ++i) {
+    /* %4 to %49: elementwise on 64 numbers */
+    float v49[64];
+    for (int i = 0; i < 64; ++i) {
         float t4 = v1[i] * 0.318309873f;
         float t6 = t4 + 0.5f;
         float t7 = floorf(t6);
@@ -222,21 +246,21 @@ static inline void wamnet_pixel(
         v49[i] = t49;
     }
 
-    /* %50: affine map W1 from 32 to 32 */
-    float v50[32];
-    for (int j = 0; j < 32; ++j) {
-        v50[j] = weights[56352 + j];
+    /* %50: affine map W1 from 64 to 64 */
+    float v50[64];
+    for (int j = 0; j < 64; ++j) {
+        v50[j] = weights[65600 + j];
     }
-    for (int i = 0; i < 32; ++i) {
+    for (int i = 0; i < 64; ++i) {
         float value = v49[i];
-        for (int j = 0; j < 32; ++j) {
-            v50[j] += weights[55328 + i * 32 + j] * value;
+        for (int j = 0; j < 64; ++j) {
+            v50[j] += weights[61504 + i * 64 + j] * value;
         }
     }
 
-    /* %52 to %86: elementwise on 32 numbers */
-    float v86[32];
-    for (int i = 0; i < 32; ++i) {
+    /* %52 to %86: elementwise on 64 numbers */
+    float v86[64];
+    for (int i = 0; i < 64; ++i) {
         float t52 = 10.0f * v50[i];
         float t53 = t52 * 0.318309873f;
         float t54 = t53 + 0.5f;
@@ -275,21 +299,21 @@ static inline void wamnet_pixel(
         v86[i] = t86;
     }
 
-    /* %87: affine map W2 from 32 to 32 */
-    float v87[32];
-    for (int j = 0; j < 32; ++j) {
-        v87[j] = weights[57408 + j];
+    /* %87: affine map W2 from 64 to 64 */
+    float v87[64];
+    for (int j = 0; j < 64; ++j) {
+        v87[j] = weights[69760 + j];
     }
-    for (int i = 0; i < 32; ++i) {
+    for (int i = 0; i < 64; ++i) {
         float value = v86[i];
-        for (int j = 0; j < 32; ++j) {
-            v87[j] += weights[56384 + i * 32 + j] * value;
+        for (int j = 0; j < 64; ++j) {
+            v87[j] += weights[65664 + i * 64 + j] * value;
         }
     }
 
-    /* %88 to %122: elementwise on 32 numbers */
-    float v122[32];
-    for (int i = 0; i < 32; ++i) {
+    /* %88 to %122: elementwise on 64 numbers */
+    float v122[64];
+    for (int i = 0; i < 64; ++i) {
         float t88 = 10.0f * v87[i];
         float t89 = t88 * 0.318309873f;
         float t90 = t89 + 0.5f;
@@ -328,21 +352,21 @@ static inline void wamnet_pixel(
         v122[i] = t122;
     }
 
-    /* %123: affine map W3 from 32 to 32 */
-    float v123[32];
-    for (int j = 0; j < 32; ++j) {
-        v123[j] = weights[58464 + j];
+    /* %123: affine map W3 from 64 to 64 */
+    float v123[64];
+    for (int j = 0; j < 64; ++j) {
+        v123[j] = weights[73920 + j];
     }
-    for (int i = 0; i < 32; ++i) {
+    for (int i = 0; i < 64; ++i) {
         float value = v122[i];
-        for (int j = 0; j < 32; ++j) {
-            v123[j] += weights[57440 + i * 32 + j] * value;
+        for (int j = 0; j < 64; ++j) {
+            v123[j] += weights[69824 + i * 64 + j] * value;
         }
     }
 
-    /* %124 to %158: elementwise on 32 numbers */
-    float v158[32];
-    for (int i = 0; i < 32; ++i) {
+    /* %124 to %158: elementwise on 64 numbers */
+    float v158[64];
+    for (int i = 0; i < 64; ++i) {
         float t124 = 10.0f * v123[i];
         float t125 = t124 * 0.318309873f;
         float t126 = t125 + 0.5f;
@@ -381,15 +405,15 @@ static inline void wamnet_pixel(
         v158[i] = t158;
     }
 
-    /* %159: affine map W4 from 32 to 3 */
+    /* %159: affine map W4 from 64 to 3 */
     float v159[3];
     for (int j = 0; j < 3; ++j) {
-        v159[j] = weights[58592 + j];
+        v159[j] = weights[74176 + j];
     }
-    for (int i = 0; i < 32; ++i) {
+    for (int i = 0; i < 64; ++i) {
         float value = v158[i];
         for (int j = 0; j < 3; ++j) {
-            v159[j] += weights[58496 + i * 3 + j] * value;
+            v159[j] += weights[73984 + i * 3 + j] * value;
         }
     }
 

@@ -112,14 +112,16 @@ def ahead(
 ) -> TableOf:
     """Return by how much a row of `quality` is ahead of Open Image Denoise with the same features.
 
-    That is the one with clean features; where a row sees past mirrors and glass, the best one that does.
+    That is the one with clean features, of rays that are spread as the row's are; where a row sees past
+    mirrors and glass, the best one that does.
     """
 
     def made(records: Records) -> str:
         module = importlib.import_module("quality")
-        past, own = module.ROWS[ours].past, module.configuration(name, split, ours)
+        row, own = module.ROWS[ours], module.configuration(name, split, ours)
         found = next(records[key] for key in JUDGED if records[key].summary(own, value))
-        peer = "oidn-past-prefiltered16" if past else "oidn-clean16"
+        peer = "oidn-shadows16" if row.shadow_rays else "oidn-clean16"
+        peer = "oidn-past-prefiltered16" if row.past else peer
         one, other = (found.per_pose(module.configuration(name, split, row), value) for row in (ours, peer))
         # One seed of ours is compared with the same seed of the other: its noise is the same.
         return paired(one, other[: len(one)]).text(digits)
@@ -139,7 +141,10 @@ AHEAD = (
     ("minicubes", "page48-16", "the same, 48 neurons per layer"),
     ("minicubes-page", "shipped", "`minicubes`, any front camera, any light hue; inputs of the web page"),
     ("minicubes-page", "smooth-page-16", "the same cameras and lights, filtered colour"),
+    ("minicubes-page", "shipped-shadows", "the same, shadow rays instead: the bundled `minicubes`"),
     ("cornell", "best-16", "`cornell`, preset `best`"),
+    ("cornell", "shadows-16", "`cornell`, shadow rays: the bundled model"),
+    ("glossy", "five-shadows-16", "`glossy`, shadow rays, specular features for both: the bundled model"),
     ("glossy", "lit-16", "`glossy`, preset `mirrors`; both get specular features"),
     ("daylight", "sun-16", "`daylight`, preset `sky`; both get specular features"),
 )
@@ -389,7 +394,7 @@ TABLES: Mapping[str, TableOf] = {
     "presets": as_printed("presets", without=TIMES),
     "quality-ahead": differences,
     "quality-lamps": quality("minicubes-page"),
-    **{f"quality-{name}": quality(name) for name in ("cornell", "minicubes")},
+    **{f"quality-{name}": quality(name) for name in ("cornell", "glossy", "minicubes")},
     **{
         f"hard-{name}": quality(name, record="hard-light")
         for name in ("glossy", "daylight", "minicubes-page")

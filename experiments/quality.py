@@ -194,7 +194,7 @@ ROWS: Mapping[str, Row] = {
     "lit-slow-16": Row("the same, four times the steps", RAYS, "lit-slow", past=True),
     "lit-shadows-16": Row("`mirrors` plus direct light of shadow rays (preset `mirrors-shadows`)",
         RAYS, "lit-shadows", past=True, shadow_rays=1),
-    "five-shadows-16": Row("direct light and layers past mirrors and glass (the bundled `glossy`)",
+    "five-shadows-16": Row("direct light of shadow rays, specular features (the bundled `glossy`)",
         RAYS, "five-shadows", past=True, shadow_rays=1),
     "lit7-16": Row("preset `mirrors` with a 7x7 window", RAYS, "lit7", past=True),
     "sun-16": Row("7x7 window, plus sun direction (preset `sky`)", RAYS, "sun", past=True),

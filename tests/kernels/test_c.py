@@ -293,7 +293,11 @@ OTHER = ["-O0", "-include", "other.h", "-Wno-unknown-pragmas"]
 """What makes GCC a compiler that is not GCC, for which the standard's pragma is in the text."""
 
 
-@pytest.mark.parametrize("other", [[], ["-DWAMNET_PORTABLE"], OTHER], ids=["usual", "portable", "no GCC"])
+PORTABLE = ["-O0", "-DWAMNET_PORTABLE"]
+"""Loops for vectors, which GCC takes 20 s to make fast."""
+
+
+@pytest.mark.parametrize("other", [[], PORTABLE, OTHER], ids=["usual", "portable", "no GCC"])
 def test_a_plain_build_has_transforms_for_newer_processors(executor_named, kit, tmp_path, other):
     """KER-22, FOU-9: GCC on x86 with glibc compiles them for AVX2 and AVX-512 too; others take C99."""
     if platform.machine() != "x86_64" or "(Debian" not in executor_named("c").device:

@@ -149,10 +149,10 @@ TREE = re.compile(r"for \(int visit = 0; visit < (\d+); \+\+visit\) {")
 
 GROWN = {
     "mixture": crowd(
-        *((kind, 24) for kind in MAKERS), lights=(LIGHT, replace(LIGHT, corner=(-0.9, 0.9, -0.9)))
+        *((kind, 12) for kind in MAKERS), lights=(LIGHT, replace(LIGHT, corner=(-0.9, 0.9, -0.9)))
     ),
     "no light, no room": replace(
-        crowd(*((kind, 24) for kind in MAKERS)), lights=(), room=None, background=(0.4, 0.5, 0.6)
+        crowd(*((kind, 12) for kind in MAKERS)), lights=(), room=None, background=(0.4, 0.5, 0.6)
     ),
 }
 """Scenes of enough primitives for a tree."""

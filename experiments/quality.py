@@ -223,6 +223,7 @@ SHOWN = {
     "oidn-clean16": "Open Image Denoise",
     "oidn-past-prefiltered16": "Open Image Denoise, specular features",
     "page-16": "wamnet",
+    "shadows-16": "wamnet, with shadow rays",
     "lit-16": "wamnet, specular features",
     "sun-16": "wamnet, with the sun direction",
 }

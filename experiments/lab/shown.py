@@ -357,7 +357,7 @@ def planted_faults(records: Records) -> str:
     return tables.markdown(["package", "faults", *RESULTS, "by a golden file"], cells)
 
 
-IN_SHADOW = ("cornell", "glossy", "vitrine", "daylight", "outside", "paths")
+IN_SHADOW = ("cornell", "glossy", "vitrine", "daylight", "outside", "outside-96", "paths")
 """Tables of shadow rays in other sets than the mini cubes, with more paths, and outside."""
 
 AS_PRINTED = (

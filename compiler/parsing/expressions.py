@@ -293,7 +293,9 @@ class Expressions(Reader):
         if first[0].op != "multiply" or [sign for _, sign in index] != [1]:
             raise Unread(f"a place in {image} of another form")
         pixel, channels = first[0].args
-        if channels.op != "const" or self.channels.setdefault(image, channels.value) != channels.value:
+        if (channels.op, channels.type) != ("const", INT):
+            raise Unread(f"channels of {image} that are not an int")
+        if self.channels.setdefault(image, channels.value) != channels.value:
             raise Unread(f"{image} has two numbers of channels")
         (row, _), *columns = terms(pixel)
         if row.op != "multiply" or row.args[1] != name("width"):

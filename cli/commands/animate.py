@@ -39,7 +39,6 @@ from ...refimpl.network.denoise import Model, learned_shadow_rays
 from ...refimpl.network.factored import check_rank
 from ..common import options
 from ..common.domain import Watch
-from ..common.effort import said_of_rendering
 from ..common.executors import chosen
 from ..common.inputs import learned_scene, load_model, model_path, unlike_training
 from ..common.terminal import hint_on_interrupt, progress, say
@@ -127,10 +126,6 @@ def _draw(
     # It was another process's until now.
     left = missing(folder, shots)
     remove_temporaries(folder)
-    if left:
-        jobs = [job for shot in left for job in (shot.noisy, shot.reference) if job is not None]
-        pixels, samples = left[0].noisy.width * left[0].noisy.height, sum(job.samples for job in jobs)
-        said_of_rendering(left[0].scene, samples, pixels, renderer, None)
     with open_executor(executor) as runner, progress("rendering", len(left), "frames") as advance:
         denoiser = Denoiser(runner, network, variant=with_rank(FULL, rank), pictures=len(left))
         # One device does both, from what the paths of a pixel have seen.

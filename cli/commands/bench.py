@@ -15,7 +15,6 @@ from ...kernels.bench.workload import check_size
 from ...refimpl.errors import NO_VALUE, InputError
 from ...refimpl.network.denoise import Model
 from ..common import packages
-from ..common.effort import said_of_measuring
 from ..common.executors import chosen
 from ..common.inputs import load_model, trained_scene
 from ..common.options import ExecutorName, parse_names
@@ -185,8 +184,6 @@ def measure(
     with Tools() as tools, progress("measuring", 1.0) as advance:
         everybody = contenders.of_machine(tools, request.size, request.quick and not only, forms)
         taking_part = contenders.chosen(everybody, only, executors)
-        sizes = sorted({request.size, *request.sizes})
-        said_of_measuring(len(taking_part), sizes, request.budget_s)
         contest = Contest(request, taking_part, tools, told=advance)
         hint = f"{output}: has the results so far" if output else "nothing is kept"
         with hint_on_interrupt(lambda: hint):

@@ -25,7 +25,6 @@ from ...refimpl.errors import NO_VALUE, InputError, choice
 from ...refimpl.light.scenes import CANONICAL
 from ...refimpl.light.transport import Settings
 from ...refimpl.reading import parse_json, read_file
-from ..common.effort import said_of_compiling
 from ..common.inputs import MODEL_PREFIX, load_model, load_scene
 from ..common.options import Sampler, Target
 from ..common.request import KernelRequest, given, refuse
@@ -45,9 +44,8 @@ class OfScene:
     lanes: int | None = None
 
     def compiled(self, name: str, language: Language, network: KernelRequest) -> Artifact:
-        """Return the kernel of a scene's paths; of a large scene it is said first how long it takes."""
+        """Return the kernel of a scene's paths."""
         scene = load_scene(name, self.time, self.parameters or [])
-        said_of_compiling(scene)
         settings = Settings() if self.max_depth is None else Settings(max_depth=self.max_depth)
         if self.sampler is not None:
             settings = replace(settings, sampler=self.sampler)

@@ -32,7 +32,6 @@ from ...refimpl.errors import NO_VALUE, InputError
 from ...refimpl.frame import Frame
 from ...refimpl.light.scenes import CANONICAL
 from ..common import cluster, options
-from ..common.effort import said_of_rendering
 from ..common.executors import chosen
 from ..common.inputs import check_input
 from ..common.terminal import hint_on_interrupt, progress, say
@@ -169,7 +168,7 @@ def make(
         for name in again:
             say(f"{folder / name}: damaged, rendered again")
         if made:
-            _render(store, request, frames[0], workers, scheduler)
+            _render(store, request, workers, scheduler)
     for split, d in nearest.items():
         say(
             f"{split} frames differ from the nearest training frame in {100 * d['differing']:.0f} % of the "
@@ -188,10 +187,8 @@ def compared(frames: Sequence[FramePlan]) -> dict[str, dict[str, float]]:
     return {split: comparison.as_data() for split, comparison in found.items()}
 
 
-def _render(
-    store: dataset_files.Store, request: Request, first: FramePlan, workers: int | None, scheduler: str | None
-) -> None:
-    """Do the tasks that are left in the store; the scene of the `first` frame says what they take."""
+def _render(store: dataset_files.Store, request: Request, workers: int | None, scheduler: str | None) -> None:
+    """Do the tasks that are left in the store."""
     tasks = store.tasks()
     total = sum(task.samples for task in tasks)
     if workers is None:
@@ -200,8 +197,6 @@ def _render(
         workers = 1 if alone else len(os.sched_getaffinity(0))
     if not tasks:
         return
-    shown, pixels = first.pictures[KINDS[0]].scene, request.size_px**2
-    said_of_rendering(shown, total, pixels, request.executor, workers)
     with progress("rendering", total, "samples") as advance:
         if scheduler is None and workers == 1:
             for task in tasks:

@@ -41,7 +41,6 @@ from ...refimpl.light.shading import build, ever_follows
 from ...refimpl.network.denoise import Model
 from ...refimpl.network.train import PRESETS, TrainState, model_of
 from ...refimpl.reading import read_file
-from ..common.effort import said_of_learning
 from ..common.packages import need
 from ..common.terminal import hint_on_interrupt, progress, say, table
 from ..files import dataset_files, exr, images
@@ -175,7 +174,6 @@ def carry_out(plan: Plan, output: Path) -> Results:
     """Do all steps in the folder `output` and return what they have found."""
     seconds: dict[str, float] = {}
     say(f"renderer {plan.renderer}, trainer {plan.trainer}: the fastest available")
-    said_of_learning(plan.train_frames, plan.size_px**2)
     _timed(seconds, "rendering", lambda: render_frames(plan, output))
     times, pairs = zip(*_pairs(output, "train"), strict=True)
     model, state, per_step = _timed(seconds, "training", lambda: train_network(plan, pairs, output))

@@ -12,7 +12,6 @@ from ...refimpl.light.render import Job
 from ...refimpl.light.scene import to_json
 from ...refimpl.light.transport import Settings
 from ..common import options
-from ..common.effort import said_of_rendering
 from ..common.executors import chosen
 from ..common.inputs import load_scene
 from ..common.options import FloatType
@@ -54,7 +53,6 @@ def render(
     if workers is not None and render_frame.shares_work(tracer):
         rule = f"{tracer} shares the work by itself"
         raise InputError("workers", workers, rule, "leave it out, or use --executor numpy")
-    said_of_rendering(loaded, job.samples, width * height, tracer, workers)
     started = clock.perf_counter()
     with progress(f"rendering {scene}", job.samples, "samples") as advance:
         frame = render_frame.render_frame(tracer, loaded, job, workers=workers, on_progress=advance).frame

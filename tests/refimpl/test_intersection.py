@@ -289,6 +289,20 @@ def test_boxes_are_grouped_by_rotation_and_small_groups_joined():
     assert np.array_equal(geometry.groups[2].rotation[1], geometry.groups[2].rotation[2])
 
 
+def test_many_boxes_are_grouped_in_one_look():
+    """Each box was compared with all others, which took a hundred thousand of them an hour."""
+    looks = []
+
+    class Rotation(tuple):
+        def __hash__(self):
+            looks.append(self)
+            return super().__hash__()
+
+    boxes = tuple(replace(each, rotation=Rotation(each.rotation)) for each in many_boxes(SHARING).boxes * 10)
+    Box.parts(scene_of(boxes=boxes))
+    assert len(looks) == len(boxes)
+
+
 @pytest.mark.parametrize("dtype", TYPES)
 def test_boxes_that_share_a_rotation_are_hit_like_those_that_do_not(dtype, monkeypatch):
     """Distances, surfaces and normals to the bit, whether rays are turned for a group or for each box."""

@@ -69,6 +69,14 @@ def test_json_keeps_every_bit_of_a_number(center):
     assert S.from_json(S.to_json(scene)).spheres[0].center == center
 
 
+@pytest.mark.nightly
+def test_a_text_of_a_hundred_thousand_boxes_is_read():
+    """It was refused by the reader: 103 values too many."""
+    data = json.loads(S.to_json(scenes.canonical("minicubes", time=1.0)))
+    data["boxes"] = (data["boxes"] * 4000)[:100_000]
+    assert len(S.from_json(json.dumps(data)).boxes) == 100_000
+
+
 def test_digest_depends_on_content_and_not_on_spelling():
     data = json.loads(S.to_json(EVERYTHING))
     spelled = json.dumps(dict(reversed(data.items()))).replace("5.0", "5")

@@ -1,9 +1,9 @@
 """The memory of a kernel under test: arrays whose elements many turns use at once.
 
 Turns that are run at once must have nothing to do with each other: `Race` where one writes an element that
-another reads or writes. An array that is declared inside them has a column for each. A number is one of all
-lanes, and is read by those alone that have written it; of an image's, which all lanes have written near
-borders, those that are far from them have to write the same.
+another reads or writes, unless several add sums to it, in any order. An array that is declared inside them
+has a column for each. A number is one of all lanes, and is read by those alone that have written it; of an
+image's, which all lanes have written near borders, those that are far from them have to write the same.
 """
 
 from __future__ import annotations
@@ -20,8 +20,8 @@ from .lanes import Unread, Wrong
 from .places import TILE, Place
 from .terms import Term
 
-NOBODY = -1
-"""Instead of the number of a turn that has written an element."""
+NOBODY, ADDED = -1, -2
+"""Instead of the number of a turn that has written an element: none has, or several add to it."""
 
 EMPTY, SHAPE, SUM, BOTH = range(4)
 """What an element holds: nothing, a shape, a sum on its way, or both of them."""
@@ -70,6 +70,8 @@ class Turns:
         """
         _, owner, reads = self.users(cells)
         before = owner[element]
+        if (before == ADDED).any():
+            raise Race
         last = np.maximum(before, who)
         owner[element] = last
         others = (before != NOBODY) & (before != who)
@@ -78,6 +80,13 @@ class Turns:
         if others.any() and any(np.isin(element[others], own).any() for own, _ in reads):
             raise Race
         return before <= who
+
+    def added(self, cells: Cells, element: Any) -> None:
+        """Note elements that several turns add to; `Race` where one of them has read or written these."""
+        _, owner, reads = self.users(cells)
+        if (owner[element] > NOBODY).any() or any(np.isin(element, own).any() for own, _ in reads):
+            raise Race
+        owner[element] = ADDED
 
     def save(self, cells: Cells) -> None:
         """Keep what an array holds, in case that the turns race."""
@@ -99,8 +108,9 @@ class Turns:
                 if ((found != NOBODY) & (found != who)).any():
                     raise Race
             if cells.columns < outer.count:
-                element = np.flatnonzero(owner != NOBODY)
+                element = np.flatnonzero(owner > NOBODY)
                 outer.written(cells, element, owner[element] // of)
+                outer.added(cells, np.flatnonzero(owner == ADDED))
                 for element, who in reads:
                     outer.read(cells, element, who // of)
         if outer.undoes:
@@ -156,7 +166,7 @@ class Cells:
         if self.has_due and self.due[at].any():
             raise Wrong(f"{self.name} is read before it is written, in some lanes")
         if self.columns < turns.count:
-            element = np.broadcast_to(at[0] * self.columns + at[1], state.shape)
+            element = np.broadcast_to(at[0] * self.columns + at[1], (width, turns.count))
             own = ... if active is None else active
             turns.read(self, element[:, own], turns.who[own])
         shape = self.shape[at]

@@ -167,7 +167,7 @@ def stacked(terms: Sequence[Term]) -> Term:
 def operate(name: str, a: Term, b: Term, dual: bool = False) -> Term:
     """Return a sum, a difference or a product of floats; `dual`: a sum may be an expression as well."""
     sums: Words | None = None
-    nothing, given = _vanishing(a, b, name) | _vanishing(b, a, name), (a, b)
+    nothing, given = vanishing(a, b, name) | vanishing(b, a, name), (a, b)
     if name == "multiply":
         if any(each.shape is not None and _is_zero(each.shape) for each in (a, b)):
             raise Wrong("a product with 0, which is no number where the other factor is infinite")
@@ -202,7 +202,7 @@ def _is_zero(shape: Words) -> bool:
     return bool(shape.flat[0] == zero()) and bool((shape == zero()).all())
 
 
-def _vanishing(term: Term, other: Term, name: str) -> NDArray[np.bool_]:
+def vanishing(term: Term, other: Term, name: str) -> NDArray[np.bool_]:
     """Return in which turns a number of a sum is 0: a weight that fills up a vector, or its product.
 
     That is no number where the other factor is infinite, so what is made of it is unknown. A vector is 0

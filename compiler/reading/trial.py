@@ -40,11 +40,11 @@ from ..kernel.kernel import (
 from ..kernel.verify import STEPS
 from .cells import Cells, Device, Race, Shared, Slice, Turns
 from .claim import Claim
-from .field import Words, hashed
+from .field import P, Words, hashed
 from .integers import Stored
 from .lanes import Unread, Wrong
 from .places import NOTHING, TILE, Place, corner
-from .terms import Term, constant
+from .terms import Term, constant, vanishing
 from .values import Values
 
 MOST = 2**20
@@ -171,11 +171,34 @@ class Trial(Values):
         if statement.add:
             away = value.op == "negative"
             number = self.value(value.args[0] if away else value)
+            if not away and self._added(statement.array, index, kind, number):
+                return
             read = self._load(statement.array, index, kind)
             total = self.operate("subtract" if away else "add", read, number)
             self._put(statement.array, index, kind, total)
         else:
             self._put(statement.array, index, kind, self.value(value))
+
+    def _added(self, array: str, index: Sequence[Any], kind: Type, number: Any) -> bool:
+        """Add sums of all turns at once to a number that all of them add to; return whether this was done.
+
+        Sums of some turns are left out: where one is the program's, that of all is none of it.
+        """
+        turns, sums = self.turns, number.sums if isinstance(number, Term) and number.shape is None else None
+        if sums is None or self.mask is not None or self.dual or vanishing(number, number, "add").any():
+            return False
+        cells, place = self._place_of(array, index, kind)
+        if not isinstance(cells, Cells) or np.size(place) > 1 or cells.columns == turns.count:
+            return False
+        rows = np.arange(kind.lanes)[:, None] + place
+        turns.save(cells)
+        turns.added(cells, rows * cells.columns + np.arange(cells.columns))
+        each = np.broadcast_to(sums % P, (*sums.shape[:-1], turns.count))
+        total = each.reshape(*sums.shape[:-1], cells.columns, -1).sum(axis=-1)
+        self.turns = Turns(cells.columns)
+        self._put(array, index, kind, self.operate("add", self._load(array, index, kind), Term(None, total)))
+        self.turns = turns
+        return True
 
     def _put(self, array: str, index: Sequence[Any], kind: Type, value: Any) -> None:
         if array == RESULT:

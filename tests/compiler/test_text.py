@@ -316,6 +316,25 @@ def test_numbers_that_two_turns_write_are_read_in_order(plain, or_else):
         run_text(*changed(plain, "v86[i] = t86;", f"v86[i] = t86; {more}"))
 
 
+@pytest.mark.parametrize(
+    "new",
+    [
+        f"part1[j] += {PRODUCT}; if (c < 2) {{ part1[j] += {PRODUCT}; }}",
+        f"part1[j] += {PRODUCT}; part1[j] += part1[j] * 0.5f;",
+        f"if (c == 1) {{ part1[j] = 0.0f; }} part1[j] += {PRODUCT};",
+        f"if (c != 1) {{ part1[j] += {PRODUCT}; }}",
+        f"part1[(j + c) % 6] += {PRODUCT};",
+        f"float a = part1[j]; part1[j] += {PRODUCT}; v1[j] += a - a;",
+        f"part1[j] += {PRODUCT}; v1[j] = part1[j];",
+        f"part1[0] += {PRODUCT};",
+    ],
+)
+def test_sums_of_all_turns_are_those_of_each(plain, new):
+    """TXT-10: turns that add to one number are run at once; what they add is read, or left out, by none."""
+    with pytest.raises((Refused, Unread), match=r"never made|before it is written|not the program's"):
+        run_text(*changed(plain, f"part1[j] += {PRODUCT};", new))
+
+
 def test_constants_of_type_double_are_not_read(plain):
     """C takes 0.5 for a double; GLSL takes it for a float."""
     with pytest.raises(Unread, match="begins with no token"):

@@ -127,6 +127,30 @@ def test_turns_inside_turns_have_used_what_these_use():
         inner.end(outer)
 
 
+@pytest.mark.parametrize("inside", [False, True])
+@pytest.mark.parametrize("first", [0, 1])
+@pytest.mark.parametrize(
+    "use", [get, lambda cells, turns, place: put(cells, turns, place, 1, 2)], ids=["read", "write"]
+)
+@pytest.mark.parametrize("ordered", [True, False])
+def test_what_turns_add_to_they_do_not_use(inside, first, use, ordered):
+    """Nor do those around them: the sum of some turns is not known."""
+    cells, outer = Cells("x", 2, 1), Turns(2, ordered=ordered)
+    for place in (0, 1):
+        put(cells, Turns(1), [place], 5)
+
+    def add():
+        turns = Turns(4) if inside else outer
+        turns.added(cells, np.array([0]))
+        if inside:
+            turns.end(outer)
+
+    steps = [add, lambda: use(cells, outer, [0, 1])]
+    steps[first]()
+    with pytest.raises(Race, match="with each other"):
+        steps[1 - first]()
+
+
 def test_what_raced_is_undone():
     cells, turns = Cells("x", 2, 1), Turns(2, undoes=True)
     put(cells, Turns(1), [0], 7)

@@ -182,7 +182,7 @@ class Trial(Values):
     def _added(self, array: str, index: Sequence[Any], kind: Type, number: Any) -> bool:
         """Add sums of all turns at once to a number that all of them add to; return whether this was done.
 
-        Sums of some turns are left out: where one is the program's, that of all is none of it.
+        Sums of some turns are left out: where one is the program's, that of all is not.
         """
         turns, sums = self.turns, number.sums if isinstance(number, Term) and number.shape is None else None
         if sums is None or self.mask is not None or self.dual or vanishing(number, number, "add").any():

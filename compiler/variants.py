@@ -461,12 +461,10 @@ def bound_of(plan: Plan) -> Array | None:
 # ---- kernels ----------------------------------------------------------------------------------------------
 
 
-def plan_model(
-    model: Model, language: Language | str, profile: str = "ieee", schedule: str = PLAIN, variant: str = FULL
-) -> Plan:
-    """Return the plan of a model, or of a variant of it; `profile` may get the variant's sine."""
-    varied = vary(parse(variant), model)
-    chosen = language_named(language).under(varied.profile(profile))
+def plan_model(model: Model, language: Language | str, schedule: str = PLAIN, variant: str = FULL) -> Plan:
+    """Return the plan of a model, or of a variant of it, whose sine the language's profile may get."""
+    varied, chosen = vary(parse(variant), model), language_named(language)
+    chosen = chosen.under(varied.profile(chosen.profile.name))
     found = plan_program(lower(varied.model), chosen, schedule, varied.rank)
     return replace(found, varied=varied)
 

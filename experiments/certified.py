@@ -56,7 +56,7 @@ def row(model: str, name: str, folder: Path) -> list[str]:
     """Return a row of the table: of one kernel."""
     target, schedule, variant = split(name)
     network = load_model(ROOT / "models" / f"{model}.safetensors")
-    plan = plan_model(network, target, "ieee", schedule, variant or FULL)
+    plan = plan_model(network, target, schedule, variant or FULL)
     write(compile_plan(plan), folder)
     begun = time.process_time()
     bound = max(check(folder / CERTIFICATE_NAME)["bound"]["output"])

@@ -184,7 +184,7 @@ def planned(name: str, target: str, schedule: str) -> Plan:
     """Return the plan of a network."""
     model, variant = network(name)
     named = WAYS[target].target if target in WAYS else ""
-    return replace(plan_model(model, named or target, "ieee", schedule, variant), proves=False)
+    return replace(plan_model(model, named or target, schedule, variant), proves=False)
 
 
 def images_for(name: str, size: tuple[int, int]) -> dict[str, Picture]:

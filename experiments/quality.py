@@ -415,7 +415,7 @@ def timed(bench: Bench, kept: Results, rounds: int) -> None:
             model, _ = bench.model(ROWS[row], 0)
             size = (frame.height, frame.width)
             plan = plan_model(model, device.name)
-            plan = plan.scheduled(Tuning(device, plan.model, size, plan.varied.rank).picked(rounds)[0])
+            plan = plan.scheduled(Tuning(device, plan.model, size, plan.varied).picked(rounds)[0])
             kernel = compile_plan(plan)
             device.build(kernel, size)
             ways |= _ways(device, model, kernel, frame, row)

@@ -158,7 +158,7 @@ def small(folder: Path) -> Iterator[Path]:
     model = Model(network, ("color", "normal"), Window(3, "clamp"), Normalization())
     for target, schedule, variant in [*((target, "plain", "full") for target in TITLES), *TILES]:
         made = folder / f"{target}-{schedule}"
-        write(compile_plan(plan_model(model, target, "ieee", schedule, variant)), made)
+        write(compile_plan(plan_model(model, target, schedule, variant)), made)
         yield made
 
 

@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from . import models
-from .kernel import PLAIN, Certificate, CertificateError, Function, Kernel, target_of
+from .kernel import PLAIN, Certificate, CertificateError, Function, Kernel, language_of
 from .refimpl.errors import NO_VALUE, InputError, choice
 from .refimpl.frame import Frame, validate
 
@@ -220,7 +220,7 @@ def compile(  # noqa: A001 - what it does
     from .compiler.compile import compile_plan
     from .compiler.variants import plan_model
 
-    return Kernel(compile_plan(plan_model(load(model), target_of(target), profile, schedule, variant)))
+    return Kernel(compile_plan(plan_model(load(model), language_of(target, profile), schedule, variant)))
 
 
 def certify(kernel: Kernel | Paths) -> Certificate:

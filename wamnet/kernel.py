@@ -13,19 +13,18 @@ from numpy.typing import NDArray
 from .compiler import artifact as artifacts
 from .compiler.artifact import Artifact
 from .compiler.core import ir
-from .compiler.targets import ALIASES, LANGUAGES, language_named
+from .compiler.targets import ALIASES, LANGUAGES, Language, language_named
 from .refimpl.errors import InputError, WamnetError, choice
 
 PLAIN = "plain"
 """The schedule that every target has."""
 
 
-def target_of(language: str) -> str:
-    """Return the compiler's target for a language; raise InputError for an unknown one."""
-    target = ALIASES.get(language, language)
-    if target not in LANGUAGES:
-        raise InputError("target", language, "unknown", choice(language, [*ALIASES, *LANGUAGES]))
-    return target
+def language_of(target: str, profile: str) -> Language:
+    """Return the language of a target under a profile; raise InputError for an unknown target."""
+    if ALIASES.get(target, target) not in LANGUAGES:
+        raise InputError("target", target, "unknown", choice(target, [*ALIASES, *LANGUAGES]))
+    return language_named(target).under(profile)
 
 
 class CertificateError(WamnetError):
@@ -127,6 +126,4 @@ class Function:
         """Compile to a kernel; `target`, `profile` and `schedule` are those of `wamnet.compile`."""
         from .compiler.compile import compile_program
 
-        return Kernel(
-            compile_program(self.program, language_named(target_of(target)).under(profile), schedule)
-        )
+        return Kernel(compile_program(self.program, language_of(target, profile), schedule))

@@ -111,7 +111,7 @@ def _compiled_model(
         with open_executor(language.name) as runner:
             runner.profile = network.profile
             plan = network.plan(model, language.name)
-            schedule, reason = Tuning(runner, plan.model, (1024, 1024), plan.varied.rank).picked(1000)
+            schedule, reason = Tuning(runner, plan.model, (1024, 1024), plan.varied).picked(1000)
             say(f"schedule {schedule} for {runner.device}: {reason}")
         network = replace(network, schedule=schedule)
     return compile_plan(network.plan(model, language))

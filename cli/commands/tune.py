@@ -36,8 +36,8 @@ def tune(
     remedy = "wait for it, or choose another with --cache"
     alone = alone_in(folder, "tuning", remedy) if folder and kept else nullcontext()
     with alone, open_executor(executor.value) as runner:
-        plan = plan_model(network, runner.name, variant=with_rank(FULL, rank))
-        tuning = Tuning(runner, plan.model, square, plan.varied.rank)
+        plan = plan_model(network, runner.language, variant=with_rank(FULL, rank))
+        tuning = Tuning(runner, plan.model, square, plan.varied)
         known = None if force else tuning.remembered()
         found = known or tuning.measured(plan)
         # A long compilation may pay for an animation.

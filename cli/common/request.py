@@ -103,9 +103,11 @@ class KernelRequest:
     def plan(self, model: Model, language: Language | str) -> Plan:
         """Return the plan of a model's kernel in a language."""
         from ...compiler.schedules.schedules import PLAIN
+        from ...compiler.targets import language_named
         from ...compiler.variants import plan_model
 
-        return plan_model(model, language, self.profile, self.schedule or PLAIN, self.network())
+        chosen = language_named(language).under(self.profile)
+        return plan_model(model, chosen, self.schedule or PLAIN, self.network())
 
 
 def given(request: Any, *names: str) -> dict[str, object]:

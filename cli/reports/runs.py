@@ -60,7 +60,7 @@ def run_one(name: str, kernel: Artifact, model: Model, frame: Frame, truth: Any)
     """
     with kernels.open_executor(name) as executor:
         schedule = executor.schedule_for((frame.height, frame.width))
-        plan = plan_model(model, name, kernel.profile, schedule)
+        plan = plan_model(model, executor.language.under(kernel.profile), schedule)
         # The bound is that of the network's kernel: its images are the reference's.
         images = images_of(model, frame)
         first = kernels.denoise_on(executor, model, frame, images=images)

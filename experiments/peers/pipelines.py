@@ -90,7 +90,7 @@ class Ours:
         shots, scene, size = moments(self.scene), scene_source(self.scene).at(), self.size
         job = Job(size, size, feature_spp=self.rays, shadow_rays=learned_shadow_rays(self.model))
         plan = plan_model(self.model, self.executor.name)
-        schedule, _ = Tuning(self.executor, plan.model, (size, size), plan.varied.rank).picked()
+        schedule, _ = Tuning(self.executor, plan.model, (size, size), plan.varied).picked()
         denoiser = compile_plan(plan.scheduled(schedule))
 
         def separate() -> None:

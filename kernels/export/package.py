@@ -175,7 +175,8 @@ def _compiled(request: Request) -> Export:
     place = row.places[how]
     at = f"{row.name} with --weights {how}"
     schedule = _one_of("--schedule", request.schedule, place.schedules, at, remedy)
-    plan = plan_model(request.model, row.kernel(how), request.profile, schedule, request.variant)
+    language = row.kernel(how).under(request.profile)
+    plan = plan_model(request.model, language, schedule, request.variant)
     denoiser = compile_plan(plan)
     limits = _limits(request, row, place, denoiser)
     programs = _programs(request, row)

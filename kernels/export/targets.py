@@ -139,10 +139,9 @@ class Row:
         """Return the language, wherever weights are."""
         return language_named(self.of or self.name)
 
-    def kernel(self, place: str) -> str:
-        """Return the compiler's target with the weights at a place."""
-        placed = f"{self.language.name}:{place}"
-        return placed if placed in LANGUAGES else self.language.name
+    def kernel(self, place: str) -> Language:
+        """Return the language with the weights at a place."""
+        return LANGUAGES.get(f"{self.language.name}:{place}", self.language)
 
     def files(self, stem: str, source: str) -> Mapping[str, bytes]:
         """Return the files of a source: those that it is translated to, or it as it is."""

@@ -310,14 +310,13 @@ class Measurement:
 
     def _plan(self, schedule: str = PLAIN, variant: str = variants.FULL) -> Plan:
         """Return the plan of a variant."""
-        device = self.executor
-        return variants.plan_model(self.model, device.language, device.profile, schedule, variant)
+        return variants.plan_model(self.model, self.executor.language, schedule, variant)
 
     def promising(self) -> tuple[str, ...]:
         """Return the schedules under which the full network is fastest on a small picture, the best first."""
         plan = self._plan()
         found = (_compiled(plan.scheduled(name)) for name in plan.target.schedules)
-        small = Tuning(self.executor, plan.model, (TRIAL, TRIAL), plan.varied.rank)
+        small = Tuning(self.executor, plan.model, (TRIAL, TRIAL), plan.varied)
         trials = {artifact.plan.asked: small.trial(artifact) for artifact in found if artifact}
         return tuple(sorted(trials, key=trials.__getitem__)[:MOST_SCHEDULES])
 

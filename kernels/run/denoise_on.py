@@ -142,8 +142,7 @@ class Denoiser:
         """Return the plan."""
         from ...compiler.variants import plan_model
 
-        executor, schedule = self.executor, self.schedule or PLAIN
-        plan = plan_model(self.full, executor.language, executor.profile, schedule, self.variant)
+        plan = plan_model(self.full, self.executor.language, self.schedule or PLAIN, self.variant)
         return replace(plan, proves=not self.keeps)
 
     def kernel(self, size: Size) -> tuple[Artifact, str]:
@@ -159,8 +158,8 @@ class Denoiser:
         """Return the kernel, not yet built, and why it has this schedule."""
         name, reason = self.schedule, "as asked"
         if name is None:
-            rank = self.plan.varied.rank if self.plan else 0
-            name, reason = Tuning(self.executor, self.model, size, rank).picked(self.pictures)
+            varied = self.plan.varied if self.plan else None
+            name, reason = Tuning(self.executor, self.model, size, varied).picked(self.pictures)
         if not self.keeps:
             return self._compiled(name)[0], reason
         digest = hashlib.sha256(model_bytes(self.full)).hexdigest()

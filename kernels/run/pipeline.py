@@ -97,7 +97,7 @@ class Pipeline(Closing):
         """Compile all kernels for pictures of `size` (height, width)."""
         check_model(model)
         # The first picture does not wait for a proof that nobody reads.
-        plan = replace(plan_model(model, device.language, device.profile, variant=variant), proves=False)
+        plan = replace(plan_model(model, device.language, variant=variant), proves=False)
         model = plan.model
         self._height, self._width = size
         self._settings = settings or Settings()
@@ -122,7 +122,7 @@ class Pipeline(Closing):
         self.set_scene(scene)
         planned = planes(groups)
         self.encode = compile_encode(features, scales, language, planned, integers, count)
-        schedule, _ = Tuning(device, plan.model, size, plan.varied.rank).picked(pictures)
+        schedule, _ = Tuning(device, plan.model, size, plan.varied).picked(pictures)
         self.denoise = compile_plan(plan.scheduled(schedule))
         self._drawn = self._closed = False
         self.passes = Passes(device, self.encode, self.denoise, size)

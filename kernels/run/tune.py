@@ -37,6 +37,7 @@ if TYPE_CHECKING:
     from ...compiler.artifact import Artifact
     from ...compiler.core.ir import Program
     from ...compiler.plan import Plan
+    from ...compiler.variants import Varied
 
 CROP = (19, 45)
 """Rows and columns of the picture on which results are checked: neither is a multiple of any group's."""
@@ -86,13 +87,13 @@ class Table:
 class Tuning:
     """The schedules of a network on an open device, for pictures of a size (height, width).
 
-    `rank`: that of its first layer, if it is cut to one.
+    `varied`: what a variant does to the network, whose rank and sine tables are measured for.
     """
 
     executor: Executor
     model: Model
     size: tuple[int, int]
-    rank: int = 0
+    varied: Varied | None = None
 
     def picked(self, pictures: int = 1) -> tuple[str, str]:
         """Return the schedule for so many pictures, as measured here or built in, and why, without a plan."""
@@ -108,9 +109,10 @@ class Tuning:
     @property
     def entry(self) -> str:
         """Return the name of the cache's entry: a table of other kernels than today's is no use."""
-        model = self.model
+        model, varied, profile = self.model, self.varied, self.executor.profile
         network = [list(model.siren.widths), list(model.features), model.window.size, model.window.border]
-        how = [self.executor.profile, self.rank, size_class(self.size), cache.program_version()]
+        how = [varied.profile(profile), varied.rank] if varied else [profile, 0]
+        how += [size_class(self.size), cache.program_version()]
         return f"tuning-{cache.key(*self.executor.identity, network, *how)}"
 
     def remembered(self) -> Table | None:

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from wamnet.compiler import variants
 from wamnet.compiler.compile import compile_plan
 from wamnet.compiler.core import sine
-from wamnet.compiler.targets import TARGETS
+from wamnet.compiler.targets import TARGETS, language_named
 from wamnet.compiler.variants import parse, plan_model, vary, with_rank
 from wamnet.refimpl.errors import InputError
 from wamnet.refimpl.network import siren
@@ -241,7 +241,7 @@ def test_a_bound_holds_where_a_weight_is_wrong() -> None:
 
 
 def test_native_sines_have_no_bound_on_numpy() -> None:
-    plan = plan_model(small(), "numpy", "native", variant="rank2")
+    plan = plan_model(small(), language_named("numpy").under("native"), variant="rank2")
     assert variants.bound_of(plan) is None
     manifest = compile_plan(plan).manifest
     assert manifest["variant"]["bound"]["output"] is None

@@ -40,7 +40,7 @@ def planned(executor, network=None, **how):
 
 def choose(executor, plan, size, pictures=1):
     """Return the schedule of a plan and why."""
-    return Tuning(executor, plan.model, size, plan.varied.rank).picked(pictures)
+    return Tuning(executor, plan.model, size, plan.varied).picked(pictures)
 
 
 def measured(executor, plan, *names):
@@ -48,7 +48,7 @@ def measured(executor, plan, *names):
     if names:
         few = {name: plan.target.schedules[name] for name in names}
         plan = replace(plan, target=replace(plan.target, schedules=few))
-    return Tuning(executor, plan.model, SIZE, plan.varied.rank).measured(plan, repeats=1)
+    return Tuning(executor, plan.model, SIZE, plan.varied).measured(plan, repeats=1)
 
 
 def keep(executor, table):
@@ -141,6 +141,8 @@ def test_a_table_of_another_network_or_size_is_not_taken(executor_named, monkeyp
     cases = [(model((9,)), SIZE), (zero, SIZE), (albedo, SIZE), (model(), (13, 20)), (model(), (12, 10))]
     for other, size in cases:
         assert choose(executor, planned(executor, other), size)[1].startswith("built-in")
+    for variant in ("rank2", "sine7"):
+        assert choose(executor, planned(executor, variant=variant), SIZE)[1].startswith("built-in")
     monkeypatch.setattr(executor, "profile", "native")
     assert choose(executor, planned(executor), SIZE)[1].startswith("built-in")
 

@@ -84,7 +84,7 @@ def chosen(executor, whole):
     siren_or_whole = rounded(network, 12) if whole else network
     model = Model(siren_or_whole, ("color", "normal"), Window(12), dataset.Normalization())
     plan = plan_model(model, executor.name)
-    plan = plan.scheduled(Tuning(executor, plan.model, (64, 64), plan.varied.rank).picked()[0])
+    plan = plan.scheduled(Tuning(executor, plan.model, (64, 64), plan.varied).picked()[0])
     return plan.schedule.name
 
 

@@ -7,6 +7,7 @@ from wamnet.compiler import artifact
 from wamnet.compiler.compile import compile_plan, compile_program
 from wamnet.compiler.core.lower import lower
 from wamnet.compiler.proof.evidence import read
+from wamnet.compiler.targets import language_named
 from wamnet.compiler.variants import plan_model
 from wamnet.refimpl.network import siren
 from wamnet.refimpl.network.dataset import Normalization
@@ -29,7 +30,7 @@ def kernel(folder, target, schedule="plain", **kwargs):
 
 def planned(folder, target, schedule="plain", variant="whole8", profile="ieee", **kwargs):
     """Write a kernel of a variant or a profile; return its certificate's path."""
-    plan = plan_model(model(**kwargs), target, profile, schedule, variant)
+    plan = plan_model(model(**kwargs), language_named(target).under(profile), schedule, variant)
     artifact.write(compile_plan(plan), folder)
     return folder / NAME
 

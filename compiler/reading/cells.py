@@ -121,23 +121,23 @@ class Turns:
 class Cells:
     """An array of `count` numbers in `columns`: shapes, sums and spans.
 
-    `region`: in which condition on lanes a number was written, or 0: nothing outside of it reads the number.
-    `due`: what lanes far from borders have to write before it is read, or 0.
+    `condition`: the one on lanes in which a number was written, or 0: nothing outside it reads the number.
+    `expected`: what lanes far from borders have to write before it is read, or 0.
     """
 
     def __init__(self, name: str, count: int, columns: int, kind: str = "float32") -> None:
         self.name, self.count, self.columns, self.kind = name, count, columns, kind
         size, whole = (count, columns), kind != "float32"
-        self.state, self.region = np.zeros(size, np.uint8), np.zeros(size, np.int32)
+        self.state, self.condition = np.zeros(size, np.uint8), np.zeros(size, np.int32)
         self.shape, self.sums = np.zeros(size, np.uint64), np.zeros((2, *size), np.uint64)
-        self.due = np.zeros(size, np.uint64)
+        self.expected = np.zeros(size, np.uint64)
         self.span = np.zeros((2, *(size if whole else (0, 0))), np.int64)
-        self.has_sums, self.has_due = whole, False
+        self.has_sums, self.has_expected = whole, False
 
     @property
     def arrays(self) -> tuple[NDArray[Any], ...]:
         """All that it holds."""
-        return self.state, self.region, self.shape, self.sums, self.due, self.span
+        return self.state, self.condition, self.shape, self.sums, self.expected, self.span
 
     def at(self, place: Any, width: int, turns: Turns, active: NDArray[np.bool_] | None) -> Any:
         """Return rows and columns (width, turns) of an access; place 0 if not active."""
@@ -154,16 +154,16 @@ class Cells:
             return rows, 0
         return rows, np.arange(turns.count) // (turns.count // self.columns)
 
-    def load(self, place: Any, width: int, turns: Turns, active: Any, regions: Sequence[int] = ()) -> Term:
+    def load(self, place: Any, width: int, turns: Turns, active: Any, conditions: Sequence[int] = ()) -> Term:
         """Return numbers that have been written, in one of the conditions on lanes that hold."""
         at = self.at(place, width, turns, active)
         state = self.state[at]
-        bad, region = state == EMPTY, self.region[at]
-        if region.any():
-            bad |= ~np.isin(region, (0, *regions))
+        bad, condition = state == EMPTY, self.condition[at]
+        if condition.any():
+            bad |= ~np.isin(condition, (0, *conditions))
         if (bad if active is None else bad & active).any():
             raise Wrong(f"{self.name} is read before it is written")
-        if self.has_due and self.due[at].any():
+        if self.has_expected and self.expected[at].any():
             raise Wrong(f"{self.name} is read before it is written, in some lanes")
         if self.columns < turns.count:
             element = np.broadcast_to(at[0] * self.columns + at[1], (width, turns.count))
@@ -200,14 +200,14 @@ class Cells:
         value: Term,
         turns: Turns,
         active: Any,
-        region: int = 0,
-        due: Words | None = None,
+        condition: int = 0,
+        expected: Words | None = None,
     ) -> None:
         """Write numbers of active turns (turns,), in a condition on lanes."""
         at, own = self._written(place, width, turns, active)
         self.shape[at] = 0 if value.shape is None else own(value.shape, 0)
-        self.region[at], self.due[at] = region, 0 if due is None else own(due, 0)
-        self.has_due = self.has_due or due is not None
+        self.condition[at], self.expected[at] = condition, 0 if expected is None else own(expected, 0)
+        self.has_expected = self.has_expected or expected is not None
         self.state[at] = SHAPE if not value.begins else SUM if value.shape is None else BOTH
         if value.begins:
             self.sums[:, at[0], at[1]] = own(value.term, 1)
@@ -216,16 +216,16 @@ class Cells:
             for end in (0, 1):
                 self.span[end][at] = own(value.span[end], 0)
 
-    def confirm(self, place: Any, width: int, due: Words, turns: Turns, active: Any) -> None:
+    def complete(self, place: Any, width: int, expected: Words, turns: Turns, active: Any) -> None:
         """Write in some lanes what all of them have written before: the others read that later."""
         at, own = self._written(place, width, turns, active, kept=True)
         if (self.state[at] == EMPTY).any():
             raise Wrong(f"{self.name} is read before it is written, in some lanes")
         # Two conditions on borders of two axes leave out a corner that no lane has.
-        if (self.due[at] != own(due, 0)).any():
+        if (self.expected[at] != own(expected, 0)).any():
             why = "is written by several conditions on borders, or has another number far from borders than"
             raise Wrong(f"{self.name} {why} near them")
-        self.due[at] = 0
+        self.expected[at] = 0
 
     def _written(self, place: Any, width: int, turns: Turns, active: Any, kept: bool = False) -> Any:
         """Return rows and columns that active turns write (others `kept` these), and a function of values."""

@@ -78,8 +78,8 @@ class Trial(Values):
         self.shared: list[Shared] = []
         self.size: dict[int, int] = {}
         self.apart: Counter[tuple[int, int]] = Counter()
-        self.regions: tuple[int, ...] = (0,)
-        self.numbers_of_regions = itertools.count(1)
+        self.conditions: tuple[int, ...] = (0,)
+        self.condition_numbers = itertools.count(1)
         self.ran: set[int] = set()
         self.pixels: dict[tuple[int, int, str], Any] = {}
         width, height = Place.of(lanes, 1), Place.of(lanes, 3)
@@ -117,15 +117,15 @@ class Trial(Values):
         """Leave some of the lanes and turns active; return whether any are."""
         self.mask = mask if self.mask is None else mask & self.mask
         if mask.shape[0] > 1 and not mask.all():
-            self.regions = (*self.regions, next(self.numbers_of_regions))
+            self.conditions = (*self.conditions, next(self.condition_numbers))
         return bool(self.mask.any())
 
     def _only(self, mask: NDArray[np.bool_], body: Body) -> None:
         """Run statements for some lanes and turns."""
-        outer = self.mask, self.regions
+        outer = self.mask, self.conditions
         if self._narrow(mask):
             self.body(body)
-        self.mask, self.regions = outer
+        self.mask, self.conditions = outer
 
     # ---- statements ----------------------------------------------------------------------------------------
 
@@ -218,18 +218,18 @@ class Trial(Values):
         value, at = self.folded(value), (self.turns, self.active)
         if value.known.shape[-2] == 1:
             self._alike(array)
-            cells.store(place, kind.lanes, value, *at, self.regions[-1])
+            cells.store(place, kind.lanes, value, *at, self.conditions[-1])
             return
         # A number that was made in a condition around this one is that of more lanes.
         lanes = np.asarray(self.mask if self.looking is None else self.looking, np.uint64)
         lanes = self.claim.fold.of(lanes, 0 if self.turns.slot is None else self.turns.slot)
-        due = hashed("due", value.known[..., 1:, :], lanes)
+        expected = hashed("expected", value.known[..., 1:, :], lanes)
         if self.looking is None:
-            cells.confirm(place, kind.lanes, due, *at)
-        elif self.regions[-1]:
+            cells.complete(place, kind.lanes, expected, *at)
+        elif self.conditions[-1]:
             raise Wrong(f"{array} is read before it is written, in some lanes")
         else:
-            cells.store(place, kind.lanes, value, *at, due=due)
+            cells.store(place, kind.lanes, value, *at, expected=expected)
 
     def _alike(self, array: str) -> None:
         """Refuse what is written near borders only, where all lanes look at it [`_run_if`]."""
@@ -288,7 +288,7 @@ class Trial(Values):
             together = together and self.turns.count < TOGETHER and self.apart[key] < TRIES
             if together and self._at_once(statement, turns):
                 return
-        outer, turn = (self.mask, self.regions), start
+        outer, turn = (self.mask, self.conditions), start
         for _ in range(LONGEST):
             self.names[statement.name] = turn
             if not self._goes_on(self._of_indices("less", turn, count)):
@@ -299,7 +299,7 @@ class Trial(Values):
             turn = self._of_indices("add", turn, step)
         else:
             raise Wrong(f"a loop runs more than {LONGEST} times")
-        self.mask, self.regions = outer
+        self.mask, self.conditions = outer
 
     def _goes_on(self, condition: Any) -> bool:
         """Leave those lanes and turns in a loop in which a condition holds; return whether there are any."""
@@ -309,7 +309,7 @@ class Trial(Values):
     def _at_once(self, loop: For, turns: range) -> bool:
         """Run all turns of a loop at once, if they have nothing to do with each other."""
         outer, names, memory, size = self.turns, self.names, self.memory, dict(self.size)
-        lanes, regions = (self.mask, self.looking), self.regions
+        lanes, conditions = (self.mask, self.looking), self.conditions
         writes = any(isinstance(each, Store) and each.array == RESULT for each in walk(loop.body))
         count, written = len(turns), self.written.copy() if writes else None
         slot = None if outer.slot is None else np.repeat(outer.slot, count)
@@ -331,7 +331,7 @@ class Trial(Values):
             return False
         finally:
             self.turns, self.names, self.memory, (self.mask, self.looking) = outer, names, memory, lanes
-            self.regions = regions
+            self.conditions = conditions
 
     def _run_if(self, statement: If) -> None:
         """Run each branch for the turns that take it.
@@ -425,7 +425,7 @@ class Trial(Values):
         cells, place = self._place_of(array, index, kind)
         if isinstance(cells, Shared):
             return cells.load(place, self.mask)
-        return cells.load(place, kind.lanes, self.turns, self.active, self.regions)
+        return cells.load(place, kind.lanes, self.turns, self.active, self.conditions)
 
     def _of_weights(self, index: Sequence[Any], kind: Type) -> Term:
         """Return numbers of the file: of spectra no sums are made."""
@@ -521,8 +521,8 @@ class Trial(Values):
         claim, lanes = self.claim, self.lanes
         down, across = np.divmod(np.arange(self.written.shape[1]), claim.pixels)
         there = lanes.x + claim.stride * across[:, None] < lanes.known[1]
-        due = there & (lanes.y + down[:, None] < lanes.known[3])
-        if not (self.written | ~due[None, :, None]).all():
+        expected = there & (lanes.y + down[:, None] < lanes.known[3])
+        if not (self.written | ~expected[None, :, None]).all():
             raise Wrong("it leaves a pixel without a result")
 
 

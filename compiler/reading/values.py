@@ -66,7 +66,7 @@ class Values(Walker):
         self._wrong(bad.reshape(-1, bad.shape[-1]).any(axis=0)[None], what)
 
     def folded(self, term: Term) -> Term:
-        """Return a number of all lanes together; in a branch near borders with what is due far from them."""
+        """Return a number of all lanes together; near borders, with what other lanes write."""
         slot, near = self.turns.slot, self.looking
         if near is None and self.mask is not None and self.mask.shape[0] > 1:
             near = self.mask

@@ -407,7 +407,7 @@ def direct(world: World, surface: Surface, hit: Hit, counters: Counters, rays: i
             way = _either(wanted >= lamps, way, _to_lamp(world, surface, origin, wanted, u1))
     facing = reflects & (way.cos_surface > 0.0) & (way.cos_light > 0.0)
     blocked = intersection.occluded(world.geometry, origin, way.wi, way.distance, facing)
-    part = total / np.maximum(way.pdf, LEAST_DENSITY) * dtype.type(1 / (np.pi * rays))
+    part = total / np.maximum(way.divisor, LEAST_DENSITY) * dtype.type(1 / (np.pi * rays))
     return vectors.scale(surface.reflectance * way.radiance, np.where(facing & ~blocked, part, 0.0))
 
 
@@ -432,7 +432,7 @@ def _lamplight(world: World, surface: Surface) -> Floats:
 
 
 def _to_lamp(world: World, surface: Surface, origin: Points, wanted: Floats, u1: Floats) -> Towards:
-    """Return the way to a point of the lamp with which light adds up to what is wanted; pdf: its power."""
+    """Return the way to a point of the lamp with which light adds up to what is wanted."""
     lights, black = world.lights, np.zeros_like(wanted)
     assert lights is not None
 
@@ -447,7 +447,7 @@ def _to_lamp(world: World, surface: Surface, origin: Points, wanted: Floats, u1:
     tables = np.arange(len(lights.area), dtype=np.int32), *_lamp_tables(lights)
     _, index, share = vectors.fold_rows(pick, tables, (black, np.zeros_like(black, dtype=np.int32), black))
     way = _towards_point(lights, surface.normal, origin, index, np.minimum(share, 1.0), u1)
-    return way._replace(pdf=way.radiance[..., 0] + way.radiance[..., 1] + way.radiance[..., 2])
+    return way._replace(divisor=way.radiance[..., 0] + way.radiance[..., 1] + way.radiance[..., 2])
 
 
 def _skylight(sky: Environment, surface: Surface) -> tuple[Floats, Floats]:
@@ -458,27 +458,28 @@ def _skylight(sky: Environment, surface: Surface) -> tuple[Floats, Floats]:
 
 
 def _to_sky(sky: Environment, surface: Surface, wanted: Floats, u1: Floats) -> Towards:
-    """Return the way to the sun or to the rest of the sky; pdf: the power of what gives its light there."""
+    """Return the way to the sun or to the rest of the sky."""
     sun, rest = _skylight(sky, surface)
     sunny = wanted < sun
     share = np.where(sunny, wanted, wanted - sun) / np.maximum(np.where(sunny, sun, rest), LEAST_DENSITY)
     wi = environment.towards(sky, surface.normal, sunny, np.minimum(np.maximum(share, 0.0), 1.0), u1)
     radiance = vectors.choose(sunny, sky.irradiance, environment.gradient(sky, wi))
     cos_surface = np.maximum(vectors.dot(surface.normal, wi), 0.0)
-    pdf = np.where(sunny, *environment.power(sky))
-    return Towards(wi, cos_surface, np.ones_like(cos_surface), pdf, radiance, np.full_like(cos_surface, MISS))
+    power, facing = np.where(sunny, *environment.power(sky)), np.ones_like(cos_surface)
+    return Towards(wi, cos_surface, facing, power, radiance, np.full_like(cos_surface, MISS))
 
 
 class Towards(NamedTuple):
     """A sampled way to light: unit wi (..., 3), cosines (...) at both ends, and more.
 
-    pdf (...) of wi in 1/sr, the radiance (..., 3) that comes from there, and the distance (...).
+    divisor (...): the pdf of wi in 1/sr, or of a shadow ray the power of its source [`direct`]; the radiance
+    (..., 3) that comes from there, and the distance (...).
     """
 
     wi: Directions
     cos_surface: Floats
     cos_light: Floats
-    pdf: Floats
+    divisor: Floats
     radiance: Radiance
     distance: Floats
 
@@ -501,7 +502,7 @@ def _either(is_sky: Truths, sky: Towards, light: Towards) -> Towards:
         vectors.choose(is_sky, sky.wi, light.wi),
         np.where(is_sky, sky.cos_surface, light.cos_surface),
         np.where(is_sky, sky.cos_light, light.cos_light),
-        np.where(is_sky, sky.pdf, light.pdf),
+        np.where(is_sky, sky.divisor, light.divisor),
         vectors.choose(is_sky, sky.radiance, light.radiance),
         np.where(is_sky, sky.distance, light.distance),
     )

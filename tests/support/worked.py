@@ -172,7 +172,7 @@ def path_vertex() -> list[str]:
     site = shading.site(world.materials, surface, hit, path.direction, path.beta)
     way = transport._towards(world, site, origin, pick, u0, u1)
     other = shading.pdf(world.materials, site, hit, way.wi, way.cos_surface)
-    weight = transport.mis_weight(world.settings, way.pdf, other)
+    weight = transport.mis_weight(world.settings, way.divisor, other)
     color, light = transport.direct_light(world, site, hit, origin, pick, u0, u1)
     after, alive = transport.scatter(world, path, surface, hit, rng.counter(0), _counters())
     assert alive.all(), "the example's path continues"
@@ -186,7 +186,7 @@ def path_vertex() -> list[str]:
         ["light's u0, u1 of block 1", f"{exact(u0)}, {exact(u1)}", "RNG-7"],
         ["wi; distance s", f"{short(way.wi)}; {short(way.distance)}", "LTR-3"],
         ["cos_s, cos_l", f"{short(way.cos_surface)}, {short(way.cos_light)}", "LTR-3"],
-        ["density of the light sample", short(way.pdf), "LTR-3"],
+        ["density of the light sample", short(way.divisor), "LTR-3"],
         ["radiance L of the light", short(way.radiance), "SCN-5"],
         ["density of wi by the surface", short(other), "LAM-1"],
         ["weight (power heuristic)", short(weight), "LTR-5"],

@@ -192,7 +192,9 @@ def results(clause: str, what: str, found: Any, count: int, expected: str, likel
     hold(clause, what, several and len(found) == count, expected, told, likely)
 
 
-REFUSALS = (ArithmeticError, LookupError, TypeError, ValueError, AttributeError, RecursionError)
+REFUSALS = (
+    ArithmeticError, AssertionError, AttributeError, LookupError, RecursionError, TypeError, ValueError
+)  # fmt: skip
 """Exceptions that code raises where it should refuse with another one."""
 
 
@@ -206,11 +208,13 @@ def refuses(
 ) -> None:
     """Call what must raise an exception of a kind; `told` says what an answer is."""
     try:
-        found = told(call())
+        answer = call()
     except kind:
         return
     except REFUSALS as error:
         found = f"{type(error).__name__}: {error}"
+    else:
+        found = told(answer)
     raise Wrong(clause, what, kind.__name__, found, likely)
 
 

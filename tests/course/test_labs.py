@@ -126,6 +126,16 @@ def test_what_python_says_is_explained(code, found, likely, here):
     assert likely in wrong.likely
 
 
+def test_an_assertion_is_not_the_exception_that_a_lab_demands(here):
+    lab = next(lab for lab in LABS if lab.name.endswith("window"))
+    code = (SOLUTIONS / lab.file).read_text()
+    refusal = 'if not 1 <= size <= 64:\n        raise ValueError(f"size {size}")'
+    assert refusal in code
+    (here / lab.file).write_text(code.replace(refusal, 'assert 1 <= size <= 64, "size"'))
+    wrong = first_wrong(lab, here, here)
+    assert (wrong.clause, wrong.expected, wrong.found) == ("DAT-9", "ValueError", "AssertionError: size")
+
+
 def test_a_message_says_all_in_one_line():
     wrong = Wrong("ISC-6", "a distance", "3", "-3\x1b[2J", "the sign of b")
     assert str(wrong) == "ISC-6: a distance: 3 expected, -3\\x1b[2J found; likely: the sign of b"

@@ -29,40 +29,45 @@ class Signatures(SourceFileLoader):
     def find_spec(cls, name: str, _path: Any = None, _target: Any = None) -> ModuleSpec | None:
         """Return how a module of the package is loaded."""
         package, _, stem = name.rpartition(".")
+        if package != PACKAGE:
+            return None
         file = Path(__file__).parents[1] / "commands" / f"{stem}.py"
-        return (
-            spec_from_file_location(name, file, loader=cls(name, str(file))) if package == PACKAGE else None
-        )
+        return spec_from_file_location(name, file, loader=cls(name, str(file)))
 
     def get_code(self, fullname: str) -> CodeType:
         """Return the code of the statements that are needed."""
-        tree, stem, kept = ast.parse(self.get_data(self.path)), Path(self.path).stem, list[ast.stmt]()
+        stem, kept = Path(self.path).stem, list[ast.stmt]()
         calls = [lines["call"] for lines in table().values() if "call" in lines]
         needed = {name.partition(".")[2] for name in (*calls, *table()) if name.startswith(f"{stem}.")}
         # What is named is above what names it.
-        for node in reversed(tree.body):
-            if isinstance(node, ast.ImportFrom | ast.Import):
-                future = isinstance(node, ast.ImportFrom) and node.module == "__future__"
-                node.names = [each for each in node.names if future or (each.asname or each.name) in needed]
-                is_needed = bool(node.names)
-            elif isinstance(node, ast.FunctionDef | ast.ClassDef):
-                fields = [each for each in node.body if isinstance(each, ast.AnnAssign)]
-                is_class, is_needed = isinstance(node, ast.ClassDef), node.name in needed
-                node.body = [*fields, ast.Pass()] if is_class else ast.parse("raise NotImplementedError").body
-            else:
-                targets = getattr(node, "targets", [getattr(node, "target", ast.Pass())])
-                is_needed = bool(needed & _names(ast.Store, *targets))
-            if is_needed:
-                needed |= _names(ast.Load, node)
+        for node in reversed(ast.parse(self.get_data(self.path)).body):
+            if _is_needed(node, needed):
+                needed |= _names(node, ast.Load)
                 kept.insert(0, node)
         code: CodeType = compile(ast.fix_missing_locations(ast.Module(kept, [])), self.path, "exec")
         return code
 
 
-def _names(use: type[ast.expr_context], *nodes: ast.AST) -> set[str]:
-    """Return the names that some statements read, or set."""
-    found = (each for node in nodes for each in ast.walk(node) if isinstance(each, ast.Name))
-    return {each.id for each in found if isinstance(each.ctx, use)}
+def _is_needed(node: ast.stmt, needed: set[str]) -> bool:
+    """Tell whether a statement defines what is needed, and cut it down to that."""
+    match node:
+        case ast.ImportFrom(module="__future__"):
+            return True
+        case ast.ImportFrom() | ast.Import():
+            node.names = [each for each in node.names if (each.asname or each.name) in needed]
+            return bool(node.names)
+        case ast.FunctionDef():  # called where `--help` is the value of an option [main.py]
+            node.body = ast.parse("raise NotImplementedError").body
+            return node.name in needed
+        case ast.ClassDef():
+            node.body = [*(each for each in node.body if isinstance(each, ast.AnnAssign)), ast.Pass()]
+            return node.name in needed
+    return bool(needed & _names(node, ast.Store))
+
+
+def _names(node: ast.stmt, use: type[ast.expr_context]) -> set[str]:
+    """Return the names that a statement reads, or sets."""
+    return {each.id for each in ast.walk(node) if isinstance(each, ast.Name) and isinstance(each.ctx, use)}
 
 
 def package() -> str:

@@ -77,9 +77,8 @@ class Variant:
 
     def plan(self, model: Model, language: Language | str, schedule: str = PLAIN) -> Plan:
         """Return the plan of the form when `model` is the benchmark's."""
-        return plan_program(
-            lower(self.of(model)), language_named(language).under(self.profile), schedule, self.rank
-        )
+        chosen = language_named(language).under(self.profile)
+        return plan_program(lower(self.of(model)), chosen, schedule, self.rank)
 
     def facts(self, model: Model) -> dict[str, Any]:
         """Return profile, degree of the sine, rank, window, parameters and steps of training."""

@@ -249,10 +249,8 @@ def _unseen(denoiser: Artifact) -> Artifact:
 
 def check_measured(request: Request) -> None:
     """Refuse a target of which nothing here runs what its users would run."""
-    row = TARGETS.get(request.target)
+    target, row = request.target, TARGETS.get(request.target)
     if row is None or row.stands_in:
         rule = "does not run on real hardware here, so a time would be meaningless"
         known = ", ".join(name for name, each in TARGETS.items() if not each.stands_in)
-        raise InputError(
-            "--measure with target", request.target, rule, f"leave it out, or choose one of {known}"
-        )
+        raise InputError("--measure with target", target, rule, f"leave it out, or choose one of {known}")

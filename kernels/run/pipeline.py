@@ -110,12 +110,10 @@ class Pipeline(Closing):
         self._rays = _rays_of(job, sees(self._features))
         self._in_integers = integers = model.is_whole
         features, scales = self._features, model.normalization
-        language = device.language
+        language, passes = device.language, device.language.profile.passes
         count = self._rays.count if self._rays else 0
         painted = device.paints and not sums
-        encoding = (
-            encoding_of(features, scales, language.profile.passes, integers, count) if painted else None
-        )
+        encoding = encoding_of(features, scales, passes, integers, count) if painted else None
         groups = layers_of(self._features)
         more = {"seen": sees(self._features), "rays": self._rays, "shadow_rays": shadow_rays}
         self._paths = MovingPaths(device, self._settings, groups, more, encoding, moving)

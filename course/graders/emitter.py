@@ -77,7 +77,7 @@ def of(*lines: str, output: int | None = None) -> Program:
 
 
 SINGLE = {
-    "add": (of("add 0 1"), "an input is an image of its own, image_ and node.value; a sum is {0} + {1}"),
+    "add": (of("add 0 1"), "an input is a separate image, image_ and node.value; a sum is {0} + {1}"),
     "subtract": (of("subtract 1 0"), "the order of the operands: node.args"),
     "multiply": (of("multiply 0 1"), "{0} * {1}"),
     "divide": (of("divide 0 1"), "{0} / {1}"),

@@ -75,7 +75,7 @@ class Pipeline(Closing):
     compiles long may pay [tune.py]. The kernels are `path`, `encode` and `denoise`; `moment` is the path
     kernel with the scene's numbers; `passes` runs them one by one. `feature_spp` and `feature_sampler` are
     those of a Job, whose features the images then have; the paths' first camera ray is one of these rays.
-    With `sums` the encoding is a kernel of its own on all devices.
+    With `sums` the encoding is a separate kernel on all devices.
     """
 
     def __init__(

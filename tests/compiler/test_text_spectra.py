@@ -237,6 +237,9 @@ WRONG = [(what, target, old, new) for what, names, old, new in FAULTS["texts"] f
 USUAL = [f"{names.split()[-1]}: {what}" for what, names, *_ in FAULTS["texts"][::10]]
 """One or two of each part of a kernel, in one language; a fault takes a second to read."""
 
+ENTRIES = {f"{t}-{k}": (t, *each) for t, some in FAULTS["entries"].items() for k, each in enumerate(some)}
+"""Faults of entry points; each run has every third, of all parts of a text in some language."""
+
 
 @pytest.fixture(scope="module")
 def opengl(tmp_path_factory):
@@ -274,10 +277,8 @@ def test_passes_may_be_entry_points(target, request):
     assert run_text(*request.getfixturevalue(target))["sums"] == 3 * 36
 
 
-@pytest.mark.parametrize(
-    ("target", "old", "new"),
-    [(target, *each) for target, faults in FAULTS["entries"].items() for each in faults],
-)
+@pytest.mark.nightly(but=[*ENTRIES][::3])
+@pytest.mark.parametrize(("target", "old", "new"), ENTRIES.values(), ids=ENTRIES)
 def test_wrong_entry_points_are_refused(target, old, new, request):
     with pytest.raises((Refused, Unread), match=r"\S"):
         run_text(*changed(request.getfixturevalue(target), old, new))

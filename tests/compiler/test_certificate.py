@@ -10,6 +10,7 @@ from pathlib import Path
 import jsonschema
 import numpy as np
 import pytest
+from kit import biased, untrained
 
 from wamnet.compiler import artifact
 from wamnet.compiler.compile import compile_program
@@ -20,18 +21,13 @@ from wamnet.compiler.proof import checker, evidence, scaled, sine_checker, spect
 from wamnet.compiler.targets import language_named
 from wamnet.refimpl.errors import InputError
 from wamnet.refimpl.network import siren
-from wamnet.refimpl.network.dataset import Normalization
-from wamnet.refimpl.network.denoise import Model
-from wamnet.refimpl.network.window import Window
 
 NAME = artifact.CERTIFICATE_NAME
 SPEC = Path(__file__).parents[2] / "spec"
 
 
-def model(omega_0=3.0, window=None, seed=5, activation="sine"):
-    window = window or Window(3, "zero")
-    network = siren.init((window.size**2 * 6, 6, 5, 3), 1.0, omega_0, seed, activation=activation)
-    return Model(network, ("color", "normal"), window, Normalization())
+def model(omega_0=3.0, activation="sine"):
+    return untrained((6, 5), size=3, border="zero", omegas=(1.0, omega_0), activation=activation)
 
 
 def written(folder, target="opencl", schedule="plain", **kwargs):
@@ -142,11 +138,9 @@ def test_any_number_made_smaller_is_refused(path, changed):
 
 def spectral(folder, target="opencl", schedule="fft:16", activation="sine"):
     """Write a kernel of spectra: 12 channels, of which 6 are centred, and 5 pairs of neurons."""
-    window = Window(9, "zero")
-    network = siren.init((window.size**2 * 12, 21, 6, 3), 2.0, 3.0, 5, activation=activation)
-    network = replace(network, biases=tuple(b + np.float32(0.25) for b in network.biases))
-    given = Model(network, ("color", "normal", "albedo", "position"), window, Normalization())
-    kernel = compile_program(lower(given), target, schedule=schedule)
+    features = ("color", "normal", "albedo", "position")
+    given = untrained((21, 6), features, 9, "zero", (2.0, 3.0), activation=activation)
+    kernel = compile_program(lower(biased(given)), target, schedule=schedule)
     assert kernel.manifest["schedule"]["name"] == schedule
     artifact.write(kernel, folder)
     return folder / NAME
@@ -284,7 +278,7 @@ def clipped(network, window):
 
 def test_an_activation_that_no_proof_knows_has_a_bound_and_no_certificate():
     network = siren.init((9, 4, 3), 1.0, 1.0, 5)
-    gather = lower(Model(siren.init((27, 4, 3), 1.0, 1.0, 5), ("color",), Window(3), Normalization())).gather
+    gather = lower(untrained((4,), ("color",), 3)).gather
     gather = replace(gather, images=(replace(gather.images[0], channels=1),))
     program = trace(lambda window: clipped(network, window), {"window": Type(shape=(9,))}, gather)
     kernel = compile_program(program, "opencl")

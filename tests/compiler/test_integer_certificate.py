@@ -9,6 +9,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from kit import untrained
 
 from wamnet.compiler import artifact
 from wamnet.compiler.compile import compile_program
@@ -17,16 +18,14 @@ from wamnet.compiler.proof import integer_checker
 from wamnet.compiler.proof.checker import check
 from wamnet.compiler.proof.evidence import Refused
 from wamnet.refimpl.network import siren
-from wamnet.refimpl.network.dataset import Normalization
 from wamnet.refimpl.network.denoise import Model
 from wamnet.refimpl.network.whole import rounded
-from wamnet.refimpl.network.window import Window
 
 
 def model(seed: int = 5, amplitude: int = 127, border: str = "zero") -> Model:
     """Return a small model of integers."""
-    network = rounded(siren.init((24, 6, 5, 3), 1.0, 3.0, seed), 2, amplitude)
-    return Model(network, ("color", "normal"), Window(2, border), Normalization())
+    found = untrained((6, 5), size=2, border=border, omegas=(1.0, 3.0), seed=seed)
+    return replace(found, siren=rounded(found.siren, 2, amplitude))
 
 
 def written(folder, target="opencl", schedule="plain", **kwargs):

@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 
 import pytest
+from kit import Kit
 
 from wamnet.compiler.compile import compile_program
 from wamnet.compiler.core.lower import lower
@@ -19,8 +20,6 @@ from wamnet.refimpl.errors import CompileError
 from wamnet.refimpl.light.scenes import canonical
 from wamnet.refimpl.light.transport import Settings
 from wamnet.refimpl.network.dataset import Normalization
-from wamnet.refimpl.network.denoise import Model
-from wamnet.refimpl.network.window import Window
 
 FEATURES = ("color", "normal")
 LISTED = ("opencl", "cuda", "c")
@@ -37,9 +36,7 @@ NUMBERED = {
 
 @pytest.fixture(scope="module")
 def model():
-    from kit import Kit
-
-    return Model(Kit().network([54, 6, 3], (3.0, 3.0)), FEATURES, Window(3, "clamp"), Normalization())
+    return Kit().model((6,), FEATURES)
 
 
 def kernels(target, model):

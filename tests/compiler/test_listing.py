@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from kit import untrained
 
 from wamnet.compiler.compile import compile_program
 from wamnet.compiler.core import ir
@@ -20,13 +21,10 @@ from wamnet.refimpl.light.scenes import canonical
 from wamnet.refimpl.light.shapes import quad
 from wamnet.refimpl.light.transport import Settings
 from wamnet.refimpl.network import siren
-from wamnet.refimpl.network.dataset import Normalization
-from wamnet.refimpl.network.denoise import Model
-from wamnet.refimpl.network.window import Window
 
 ROOT = Path(siren.__file__).parents[2]
 
-MODEL = Model(siren.init([12, 4, 3], 2.0, 2.0, seed=5), ("color",), Window(2), Normalization())
+MODEL = untrained((4,), ("color",), 2)
 
 
 def reference(place: str) -> str:

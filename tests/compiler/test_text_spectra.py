@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from kit import biased, untrained
 from texts import NAME, changed, parts
 
 from wamnet.compiler import artifact, targets
@@ -26,10 +27,6 @@ from wamnet.compiler.reading.lanes import Unread
 from wamnet.compiler.reading.spectra import Arithmetic, sums, transform
 from wamnet.compiler.schedules import fft
 from wamnet.compiler.schedules.passes import FourierPasses
-from wamnet.refimpl.network import siren
-from wamnet.refimpl.network.dataset import Normalization
-from wamnet.refimpl.network.denoise import Model
-from wamnet.refimpl.network.window import Window
 
 IN_PASSES = {"opengl": GLSLCompute, "glsl-vulkan": Vulkan, "wgsl": WGSL, "cuda": CUDA, "metal": Metal}
 """Languages of the schedule in passes."""
@@ -38,10 +35,8 @@ FLOATS = Arithmetic(operator.add, operator.sub, operator.mul, float)
 
 
 def model(border="zero", activation="sine", images=("color", "normal", "albedo", "position"), neurons=6):
-    channels = 3 * len(images)
-    network = siren.init((9 * channels, neurons, 5, 3), 1.0, 3.0, 5, activation=activation)
-    network = replace(network, biases=tuple(b + np.float32(0.25) for b in network.biases))
-    return Model(network, images, Window(3, border), Normalization())
+    found = untrained((neurons, 5), images, 3, border, (1.0, 3.0), activation=activation)
+    return biased(found)
 
 
 def kernel(folder, target="opencl", points=8, tiles=2, **kwargs):

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from kit import untrained
 
 from wamnet.compiler import variants
 from wamnet.compiler.compile import compile_plan
@@ -15,11 +16,9 @@ from wamnet.compiler.core import sine
 from wamnet.compiler.targets import TARGETS, language_named
 from wamnet.compiler.variants import parse, plan_model, vary, with_rank
 from wamnet.refimpl.errors import InputError
-from wamnet.refimpl.network import siren
-from wamnet.refimpl.network.dataset import Normalization
-from wamnet.refimpl.network.denoise import Model, as_dtype, check_model, denoise_pixel
+from wamnet.refimpl.network.denoise import as_dtype, check_model, denoise_pixel
 from wamnet.refimpl.network.whole import round_image
-from wamnet.refimpl.network.window import BORDERS, Window, all_windows, pad
+from wamnet.refimpl.network.window import BORDERS, all_windows, pad
 
 FEATURES = ("color", "normal")
 """What the small model sees: 6 channels, colours in [0, 1], normals in [-1, 1]."""
@@ -27,8 +26,7 @@ FEATURES = ("color", "normal")
 
 def small(size=4, hidden=(7, 6), seed=1, omega=3.0, border="clamp"):
     """Return a small random model, in float32."""
-    network = siren.init([size * size * 6, *hidden, 3], omega, omega, seed=seed, dtype=np.float32)
-    return Model(network, FEATURES, Window(size, border), Normalization())
+    return untrained(hidden, FEATURES, size, border, (omega, omega), seed)
 
 
 def image(shape=(5, 6), seed=1):
@@ -269,16 +267,14 @@ def test_manifests_say_what_was_done(target) -> None:
 @pytest.mark.parametrize("bits", [8, 10])
 def test_integers_are_within_their_bound_of_the_full_network(bits) -> None:
     """Layers so thin and weights so small that the bound says something: it is below 1 and holds."""
-    features, window = ("color", "normal"), Window(2)
-    small = siren.init((24, 3, 3), 1.0, 1.0, seed=4)
-    model = Model(small, features, window, Normalization())
+    model = small(2, (3,), 4, 1.0)
     plan = variants.plan_model(model, "numpy", variant=f"whole{bits}")
     bound = variants.bound_of(plan)
     assert bound is not None
     assert (bound < 1.0).all()
     drawn = np.random.default_rng(7).uniform(-1, 1, (500, 24)).astype(np.float32)
     drawn[:, [i for i in range(24) if i % 6 < 3]] = np.abs(drawn[:, [i for i in range(24) if i % 6 < 3]])
-    full = denoise_pixel(as_dtype(small, np.float64), drawn.astype(np.float64))
+    full = denoise_pixel(as_dtype(model.siren, np.float64), drawn.astype(np.float64))
     varied = denoise_pixel(plan.model.siren, round_image(drawn))
     assert (np.abs(full - varied) <= bound).all()
     # And it is not ten thousand times what is found: the bound is of this network, not of any.
@@ -295,10 +291,8 @@ def test_integers_have_no_variants(text) -> None:
 
 @pytest.mark.parametrize("text", ["rank2+whole8", "sine7+whole8", "whole9", "whole8+window2"])
 def test_integers_of_what_rounds_are_refused(text) -> None:
-    small = siren.init((24, 3, 3), 1.0, 1.0, seed=4)
-    model = Model(small, ("color", "normal"), Window(2), Normalization())
     with pytest.raises(InputError, match="variant"):
-        variants.vary(variants.parse(text), model)
+        vary(parse(text), small(2, (3,), 4, 1.0))
 
 
 def test_a_rank_is_short_for_a_variant() -> None:

@@ -8,6 +8,7 @@ from dataclasses import fields, replace
 
 import numpy as np
 import pytest
+from kit import untrained
 
 from wamnet.compiler import variants
 from wamnet.compiler.targets import language_named
@@ -16,10 +17,6 @@ from wamnet.kernels.run import curve
 from wamnet.kernels.run.curve import Curve, Limits, Measurement, Point, choose
 from wamnet.refimpl.errors import InputError
 from wamnet.refimpl.frame import Frame
-from wamnet.refimpl.network import siren
-from wamnet.refimpl.network.dataset import Normalization
-from wamnet.refimpl.network.denoise import Model
-from wamnet.refimpl.network.window import Window
 
 
 def point(variant, ms, error=0.1, loss=0.0, schedule="tile:16", mean=0.01):
@@ -191,8 +188,7 @@ def test_keys_tell_everything_apart() -> None:
 
 @pytest.fixture
 def model():
-    network = siren.init([4 * 4 * 3, 6, 3], 2.0, 2.0, seed=1, dtype=np.float32)
-    return Model(network, ("color",), Window(4), Normalization())
+    return untrained((6,), ("color",), seed=1)
 
 
 def frames():

@@ -25,7 +25,7 @@ from wamnet.kernels.devices import llvmpipe
 from wamnet.kernels.devices.kernel import black
 from wamnet.refimpl import frame
 from wamnet.refimpl.errors import CompileError, InputError
-from wamnet.refimpl.network import dataset, denoise
+from wamnet.refimpl.network import denoise
 from wamnet.refimpl.network.activation import ACTIVATIONS
 from wamnet.refimpl.network.window import Window
 
@@ -122,8 +122,7 @@ def test_row_0_is_the_top_row_and_columns_are_not_mirrored(denoiser, kit):
 def test_denoise_on_equals_the_definition(denoiser, kit):
     """Whole frames: the float64 `denoise` is the reference, the bound the a-priori one, over all images."""
     random = np.random.default_rng(7)
-    network = kit.network([54, 8, 3], (3.0, 3.0))
-    model = denoise.Model(network, ("color", "normal"), Window(3, "zero"), dataset.Normalization())
+    model = kit.model(border="zero")
     noisy = frame.Frame(
         {
             "color": random.uniform(0, 4, (6, 11, 3)).astype(np.float32),

@@ -23,9 +23,8 @@ from wamnet.kernels.devices import opencl_executor
 from wamnet.refimpl.errors import CompileError, InputError
 from wamnet.refimpl.frame import Frame
 from wamnet.refimpl.light.scenes import canonical
-from wamnet.refimpl.network import dataset, factored
-from wamnet.refimpl.network.denoise import Model
-from wamnet.refimpl.network.window import BORDERS, Window
+from wamnet.refimpl.network import factored
+from wamnet.refimpl.network.window import BORDERS
 
 WAYS = ways(lambda schedule: not isinstance(schedule, Transformed | Dot | GroupDot))
 """All targets and schedules that hold a first layer in two passes: spectra are of windows along both axes,
@@ -108,8 +107,8 @@ def test_the_paper_s_network_of_rank_16(executor_named, kit, target, schedule, b
 @pytest.mark.parametrize("rank", [1, 4])
 def test_executors_agree_through_denoise_on(executor_named, kit, rank) -> None:
     """A variant rankR has the picture of the model with the expanded cut, up to both bounds of rounding."""
-    network = kit.network([75, 9, 3], (3.0, 3.0))
-    model = Model(network, ("color",), Window(5, "zero"), dataset.Normalization())
+    model = kit.model((9,), ("color",), 5, "zero")
+    network = model.siren
     noisy = Frame({"color": np.random.default_rng(2).random((7, 18, 3), dtype=np.float32)})
     expanded = factored.expand(factored.cut(network.weights[0].astype(np.float64), 5, rank))
     low = replace(model, siren=replace(network, weights=(expanded.astype(np.float32), *network.weights[1:])))
@@ -126,8 +125,7 @@ def test_executors_agree_through_denoise_on(executor_named, kit, rank) -> None:
 @pytest.mark.parametrize("name", ["numpy", "opencl", "opengl-egl", "opengl-osmesa"])
 def test_passes_over_a_picture_hold_both_kernels(executor_named, kit, name) -> None:
     """Between a path kernel and a picture that stay on the device: the bits of `run` on the same images."""
-    executor, window = executor_named(name), Window(4, "zero")
-    model = Model(kit.network([96, 8, 3], (3.0, 3.0)), ("color", "normal"), window, dataset.Normalization())
+    executor, model = executor_named(name), kit.model(size=4, border="zero")
     with Pipeline(executor, canonical("minicubes"), model, (6, 11), variant="rank6") as pipeline:
         assert len(pipeline.denoise.kernels) == 2
         for seed in (2, 1):

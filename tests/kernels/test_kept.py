@@ -8,6 +8,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from kit import untrained
 
 from wamnet.compiler import compile as compiling
 from wamnet.compiler.scenes import smooth_kernel
@@ -16,8 +17,7 @@ from wamnet.kernels import cache, denoise_on
 from wamnet.kernels.run.denoise_on import data_of, kernel_of
 from wamnet.refimpl import frame
 from wamnet.refimpl.errors import CompileError
-from wamnet.refimpl.network import dataset, denoise, siren
-from wamnet.refimpl.network.window import Window
+from wamnet.refimpl.network import dataset
 
 
 @pytest.fixture(autouse=True)
@@ -25,10 +25,8 @@ def own_folder(tmp_path, monkeypatch):
     monkeypatch.setenv(cache.FOLDER_VARIABLE, str(tmp_path / "cache"))
 
 
-def model(seed=1, features=("color", "normal"), window=4):
-    channels = dataset.channels_of(features)
-    network = siren.init((window * window * channels, 8, 3), 3.0, 3.0, seed, np.float32)
-    return denoise.Model(network, features, Window(window), dataset.Normalization())
+def model(seed=1, features=("color", "normal")):
+    return untrained(features=features, omegas=(3.0, 3.0), seed=seed)
 
 
 def noisy(features=("color", "normal")):

@@ -15,9 +15,6 @@ from wamnet.refimpl.errors import InputError
 from wamnet.refimpl.light import scenes
 from wamnet.refimpl.light.render import Job
 from wamnet.refimpl.light.transport import Settings
-from wamnet.refimpl.network import dataset
-from wamnet.refimpl.network.denoise import Model
-from wamnet.refimpl.network.window import Window
 
 SETTINGS, SIZE = Settings(max_depth=2), (9, 21)
 TIMES = (0.05, 0.6, 3.3, 1.7)
@@ -25,10 +22,7 @@ TIMES = (0.05, 0.6, 3.3, 1.7)
 
 @pytest.fixture(scope="module")
 def model(kit):
-    """Return a small model."""
-    window = Window(3, "clamp")
-    network = kit.network([dataset.n_inputs(("color", "normal"), window), 8, 3], (3.0, 3.0))
-    return Model(network, ("color", "normal"), window, dataset.Normalization())
+    return kit.model()
 
 
 def cubes(time, **changed):

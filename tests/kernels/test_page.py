@@ -17,8 +17,6 @@ from wamnet.refimpl.light.scene import Sphere
 from wamnet.refimpl.light.transport import Settings
 from wamnet.refimpl.light.variation import Ranges
 from wamnet.refimpl.network import dataset
-from wamnet.refimpl.network.denoise import Model
-from wamnet.refimpl.network.window import Window
 
 SETTINGS = Settings(max_depth=1)
 OF_ONE_PICTURE = tuple(
@@ -36,13 +34,7 @@ def animation(name, *times):
 @pytest.fixture(scope="module")
 def model_of(kit):
     """Give a function that returns a small model of some features."""
-
-    def make(*features):
-        window = Window(3, "clamp")
-        network = kit.network([dataset.n_inputs(features, window), 6, 3], (3.0, 3.0))
-        return Model(network, features, window, SCALES)
-
-    return make
+    return lambda *features: kit.model((6,), features, scales=SCALES)
 
 
 def floats(text, kind="<f4"):

@@ -29,9 +29,9 @@ from wamnet.refimpl.light import scenes
 from wamnet.refimpl.light.render import Job
 from wamnet.refimpl.light.transport import Settings
 from wamnet.refimpl.network import dataset
-from wamnet.refimpl.network.denoise import Model, denoise_pixel
+from wamnet.refimpl.network.denoise import denoise_pixel
 from wamnet.refimpl.network.whole import rounded
-from wamnet.refimpl.network.window import Window, all_windows, pad
+from wamnet.refimpl.network.window import all_windows, pad
 
 SCALES = dataset.Normalization(0.5, 12.0, (0.1, -0.2, 0.3), 6.0)
 SETTINGS = Settings(max_depth=3)
@@ -56,13 +56,7 @@ def scene(name, time=1.3):
 @pytest.fixture(scope="module")
 def model_of(kit):
     """Give a function that returns a small model whose pictures lie within 0.5 +- 0.45."""
-
-    def make(features, size, border):
-        window = Window(size, border)
-        network = kit.network([dataset.n_inputs(features, window), 8, 3], (3.0, 3.0))
-        return Model(network, features, window, SCALES)
-
-    return make
+    return lambda features, size, border: kit.model((8,), features, size, border, SCALES)
 
 
 def traced(executor, model, name, case, seed):

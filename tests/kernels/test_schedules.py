@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from kit import COMPILED, networks, pictures, ways
+from kit import COMPILED, networks, pictures, untrained, ways
 
 from wamnet.compiler.compile import compile_plan, compile_program
 from wamnet.compiler.core.lower import lower
@@ -19,9 +19,8 @@ from wamnet.kernels import denoise_on
 from wamnet.kernels.devices import opencl_executor, opengl_executor
 from wamnet.refimpl import frame
 from wamnet.refimpl.errors import CompileError
-from wamnet.refimpl.network import dataset, denoise, siren
+from wamnet.refimpl.network import dataset
 from wamnet.refimpl.network.train import PRESETS
-from wamnet.refimpl.network.window import Window
 
 LADDER = ways(lambda schedule: schedule.name != "plain" and not schedule.bytewise)
 """All schedules except for the plain ones, with their targets; those of integers: test_whole.py."""
@@ -158,8 +157,8 @@ def test_no_compute_shader_before_opengl_4_3(executor_named, kit, monkeypatch):
 def test_layers_of_64_neurons_have_spectra(executor_named, target, schedule):
     """Arrays of 800 kB fit a thread's stack; both kernels are within their bounds of the exact picture."""
     recipe = PRESETS["sky"]
-    network = siren.init(recipe.layer_widths, recipe.omega_0_first, recipe.omega_0_hidden, 3, np.float32)
-    model = denoise.Model(network, recipe.features, recipe.window, dataset.Normalization())
+    omegas = recipe.omega_0_first, recipe.omega_0_hidden
+    model = untrained(recipe.widths, recipe.features, recipe.window.size, omegas=omegas, seed=3)
     rng = np.random.default_rng(4)
     images = {
         name: rng.uniform(
@@ -185,8 +184,7 @@ def test_the_time_of_a_kernel_alone(executor_named, kit):
 
 
 def test_the_device_s_schedule_is_taken_and_told(executor, kit):
-    network = kit.network([54, 8, 3], (3.0, 3.0))
-    model = denoise.Model(network, ("color", "normal"), Window(3, "zero"), dataset.Normalization())
+    model = kit.model(border="zero")
     noisy = frame.Frame({name: np.zeros((3, 4, 3), np.float32) for name in ("color", "normal")})
     assert denoise_on(executor, model, noisy).schedule.startswith(f"{executor.schedule_for((3, 4))}: ")
     asked = denoise_on(executor, model, noisy, schedule="plain")

@@ -87,10 +87,9 @@ def test_a_frame_of_misses_is_within_the_bound(device):
 # ---- where it is used ---------------------------------------------------------------------------------
 
 
-def model_of(kit, features, scales=SCALES):
+def model_of(kit, features):
     """Return an untrained model of some features."""
-    inputs = dataset.n_inputs(features, Window(3, "clamp"))
-    return Model(kit.network([inputs, 6, 3], (3.0, 3.0)), features, Window(3, "clamp"), scales)
+    return kit.model((6,), features, scales=SCALES)
 
 
 def whole_frame(layers, dtype=np.float32):

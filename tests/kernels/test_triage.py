@@ -17,9 +17,6 @@ from wamnet.kernels.judge import triage
 from wamnet.kernels.judge.reduce import Box, Stage, first_stage, reduced, shrink, stage_program, stages
 from wamnet.kernels.judge.triage import Apart, Outcome, attempt
 from wamnet.refimpl.errors import ExecutorUnavailable
-from wamnet.refimpl.network.dataset import Normalization
-from wamnet.refimpl.network.denoise import Model
-from wamnet.refimpl.network.window import Window
 
 SHAPE = (7, 9)
 """Height and width of the picture."""
@@ -34,8 +31,7 @@ RESULT = re.compile(r"( *)/\* output color \*/\n")
 @pytest.fixture(scope="module")
 def model(kit):
     """Three layers; outputs within 0.5 +- 0.45, so that no clip hides an error."""
-    network = kit.network([3 * 3 * 6, 6, 5, 3], (3.0, 3.0), seed=4)
-    return Model(network, ("color", "normal"), Window(3, "clamp"), Normalization())
+    return kit.model((6, 5), seed=4)
 
 
 @pytest.fixture(scope="module")

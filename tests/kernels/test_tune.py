@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from kit import untrained
 
 from wamnet.compiler.targets import language_named
 from wamnet.compiler.variants import plan_model
@@ -16,7 +17,6 @@ from wamnet.kernels.run import tune
 from wamnet.kernels.run.tune import Row, Table, Tuning
 from wamnet.refimpl import frame
 from wamnet.refimpl.light.scenes import canonical
-from wamnet.refimpl.network import dataset, denoise, siren
 from wamnet.refimpl.network.window import Window
 
 SIZE = (12, 20)
@@ -29,8 +29,7 @@ def own_folder(tmp_path, monkeypatch):
 
 
 def model(hidden=(8,), window=3):
-    network = siren.init((window * window * 6, *hidden, 3), 3.0, 3.0, 1, np.float32)
-    return denoise.Model(network, ("color", "normal"), Window(window), dataset.Normalization())
+    return untrained(hidden, size=window, omegas=(3.0, 3.0), seed=1)
 
 
 def planned(executor, network=None, **how):

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from kit import COMPILED, networks, ways
+from kit import COMPILED, networks, untrained, ways
 
 from wamnet.compiler.compile import compile_program
 from wamnet.compiler.core.ir import Gather, Image, Type
@@ -17,8 +19,7 @@ from wamnet.compiler.variants import plan_model
 from wamnet.kernels.devices.c_executor import COMPILER_VARIABLE, CExecutor
 from wamnet.kernels.run.tune import Tuning
 from wamnet.refimpl.errors import ExecutorUnavailable
-from wamnet.refimpl.network import dataset, siren
-from wamnet.refimpl.network.denoise import Model
+from wamnet.refimpl.network import siren
 from wamnet.refimpl.network.whole import SINES, forward_whole, rounded
 from wamnet.refimpl.network.window import Window, all_windows, pad
 
@@ -80,9 +81,8 @@ def test_every_schedule_gives_the_bits_of_the_reference(
 
 def chosen(executor, whole):
     """Return the schedule of a network, of integers or of floats, for a picture of 64 x 64."""
-    network = siren.init([12 * 12 * 6, 32, 32, 3], 1.0, 3.0, seed=1)
-    siren_or_whole = rounded(network, 12) if whole else network
-    model = Model(siren_or_whole, ("color", "normal"), Window(12), dataset.Normalization())
+    model = untrained((32, 32), size=12, omegas=(1.0, 3.0), seed=1)
+    model = replace(model, siren=rounded(model.siren, 12)) if whole else model
     plan = plan_model(model, executor.name)
     plan = plan.scheduled(Tuning(executor, plan.model, (64, 64), plan.varied).picked()[0])
     return plan.schedule.name

@@ -1,7 +1,7 @@
 """Small programs, images, and the one comparison that all tests of executors use [`Kit`]."""
 
 import os
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -21,7 +21,7 @@ from wamnet.refimpl.light.scenes import canonical
 from wamnet.refimpl.light.transport import Settings
 from wamnet.refimpl.network import siren
 from wamnet.refimpl.network.activation import SINE
-from wamnet.refimpl.network.dataset import Normalization
+from wamnet.refimpl.network.dataset import Normalization, n_inputs
 from wamnet.refimpl.network.denoise import Model, denoise_pixel
 from wamnet.refimpl.network.window import Window, all_windows, pad
 
@@ -30,6 +30,28 @@ LONG = os.environ.get("HYPOTHESIS_PROFILE") == "long"
 
 COMPILED = max(settings.default.max_examples // 50, 1)
 """Examples of a test that compiles a kernel for each, up to a second; NumPy runs many more."""
+
+
+def untrained(
+    hidden: Sequence[int] = (8,),
+    features: tuple[str, ...] = ("color", "normal"),
+    size: int = 4,
+    border: str = "clamp",
+    omegas: tuple[float, float] = (2.0, 2.0),
+    seed: int = 5,
+    activation: str = SINE,
+) -> Model:
+    """Return an untrained model, with weights as training begins with them."""
+    window = Window(size, border)
+    widths = (n_inputs(features, window), *hidden, 3)
+    network = siren.init(widths, *omegas, seed, np.float32, activation)
+    return Model(network, features, window, Normalization())
+
+
+def biased(model: Model) -> Model:
+    """Return a model none of whose biases is zero."""
+    biases = tuple(b + np.float32(0.25) for b in model.siren.biases)
+    return replace(model, siren=replace(model.siren, biases=biases))
 
 
 @st.composite
@@ -118,6 +140,20 @@ class Kit:
         last = last * np.float32(0.45 / largest / np.abs(last).sum(axis=1).max())
         return replace(drawn, weights=(*weights, last), biases=(*biases, np.full_like(middle, 0.5)))
 
+    def model(
+        self,
+        hidden: Sequence[int] = (8,),
+        features: tuple[str, ...] = ("color", "normal"),
+        size: int = 3,
+        border: str = "clamp",
+        scales: Normalization | None = None,
+        seed: int = 1,
+    ) -> Model:
+        """Return a model whose outputs lie within 0.5 +- 0.45."""
+        window = Window(size, border)
+        network = self.network([n_inputs(features, window), *hidden, 3], (3.0, 3.0), seed)
+        return Model(network, features, window, scales or Normalization())
+
     def program(
         self, function: Callable[..., Any], channels: Mapping[str, int], size: int = 1, border: str = "clamp"
     ) -> Program:
@@ -151,9 +187,7 @@ class Kit:
 
     def check_composed(self, executor: Any) -> None:
         """Insist that a pipeline gives to each kernel what the one before it returned, to the bit."""
-        features = ("color", "normal")
-        model = Model(self.network([54, 6, 3], (3.0, 3.0)), features, Window(3, "clamp"), Normalization())
-        scene, settings = canonical("lone_light"), Settings(max_depth=1)
+        model, scene, settings = self.model((6,)), canonical("lone_light"), Settings(max_depth=1)
         with Pipeline(executor, scene, model, (6, 9), settings=settings, sums=True) as pipeline:
             found = pipeline.run(seed=3)
             sums = executor.trace(pipeline.path, pipeline.part(3, 1, 0))

@@ -2,6 +2,7 @@
 
 import numpy as np
 import text_faults
+from kit import untrained
 
 from wamnet.compiler import artifact
 from wamnet.compiler.compile import compile_plan, compile_program
@@ -9,17 +10,12 @@ from wamnet.compiler.core.lower import lower
 from wamnet.compiler.proof.evidence import read
 from wamnet.compiler.targets import language_named
 from wamnet.compiler.variants import plan_model
-from wamnet.refimpl.network import siren
-from wamnet.refimpl.network.dataset import Normalization
-from wamnet.refimpl.network.denoise import Model
-from wamnet.refimpl.network.window import Window
 
 NAME = artifact.CERTIFICATE_NAME
 
 
 def model(size=3, border="zero", activation="sine", seed=5):
-    network = siren.init((size**2 * 6, 6, 5, 3), 1.0, 3.0, seed, activation=activation)
-    return Model(network, ("color", "normal"), Window(size, border), Normalization())
+    return untrained((6, 5), size=size, border=border, omegas=(1.0, 3.0), seed=seed, activation=activation)
 
 
 def kernel(folder, target, schedule="plain", **kwargs):

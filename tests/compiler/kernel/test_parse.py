@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from kit import untrained
 
 from wamnet.compiler.core.ir import Image
 from wamnet.compiler.kernel.interface import RESULT, denoiser
@@ -51,11 +52,7 @@ from wamnet.compiler.schedules.plain import Plain
 from wamnet.compiler.schedules.tile import Tile
 from wamnet.compiler.targets import LANGUAGES as TARGETS
 from wamnet.compiler.variants import plan_model
-from wamnet.refimpl.network import siren
 from wamnet.refimpl.network.activation import RELU
-from wamnet.refimpl.network.dataset import Normalization
-from wamnet.refimpl.network.denoise import Model
-from wamnet.refimpl.network.window import Window
 
 LANGUAGES = {
     dialect.target: dialect for dialect in (OpenCL(), C(), CUDA(), Metal(), GLSL(), Vulkan(), WGSL())
@@ -120,8 +117,7 @@ SCHEDULES = [
 def emitted(target, schedule, border="clamp"):
     """Return the kernel of a schedule in a language, of a small network that it holds, and its source."""
     size = 7 if schedule.startswith("fft") else 3
-    network = siren.init((size**2 * 4, 34 if size > 3 else 18, 5, 3), 1.0, 3.0, seed=5)
-    model = Model(network, ("color", "depth"), Window(size, border), Normalization())
+    model = untrained((34 if size > 3 else 18, 5), ("color", "depth"), size, border, (1.0, 3.0))
     plan = plan_model(model, target, schedule=schedule, variant="whole8" if "dot" in schedule else "full")
     assert plan.schedule.name == schedule
     details = plan.schedule.details(plan.emitted)

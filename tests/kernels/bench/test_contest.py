@@ -7,6 +7,7 @@ from collections.abc import Callable
 
 import numpy as np
 import pytest
+from kit import untrained
 
 from wamnet.compiler.targets import language_named
 from wamnet.kernels.bench import contenders, contest, rates, workload
@@ -14,10 +15,7 @@ from wamnet.kernels.bench.contenders import Contender, Opened, Tools, Variant
 from wamnet.kernels.bench.rates import Stage
 from wamnet.refimpl.errors import CompileError, ExecutorUnavailable, InputError
 from wamnet.refimpl.frame import Frame
-from wamnet.refimpl.network import siren
-from wamnet.refimpl.network.dataset import Normalization
 from wamnet.refimpl.network.denoise import Model, denoise
-from wamnet.refimpl.network.window import Window
 
 SIZE = 20
 """Width and height of pictures: more than a window, less than a crop."""
@@ -26,8 +24,7 @@ SIZE = 20
 @pytest.fixture(scope="module")
 def model() -> Model:
     """Return a network of colour and normal in a window of 4 x 4, with outputs around 0.5."""
-    network = siren.init((4 * 4 * 6, 8, 3), 2.0, 2.0, seed=5, dtype=np.float32)
-    return Model(network, ("color", "normal"), Window(4, "clamp"), Normalization())
+    return untrained()
 
 
 @pytest.fixture(autouse=True)

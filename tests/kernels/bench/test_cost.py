@@ -5,15 +5,13 @@ from __future__ import annotations
 import math
 
 import pytest
+from kit import untrained
 
 from wamnet.compiler.compile import compile_program
 from wamnet.compiler.core.lower import lower
 from wamnet.compiler.plan import analysed
 from wamnet.kernels.bench.rates import Rates, Stage, fused, predicted_seconds, sines_of
-from wamnet.refimpl.network import siren
-from wamnet.refimpl.network.dataset import Normalization
 from wamnet.refimpl.network.denoise import Model
-from wamnet.refimpl.network.window import Window
 from wamnet_peers.common import layered
 
 RATES = Rates(products_per_s=100.0, sines_per_s=10.0, bytes_per_s=1000.0, pixel_s=0.5)
@@ -23,8 +21,7 @@ RATES = Rates(products_per_s=100.0, sines_per_s=10.0, bytes_per_s=1000.0, pixel_
 @pytest.fixture(scope="module")
 def model() -> Model:
     """Return a network 12-4-3 of a window of 2 x 2 pixels of colour: 48 + 12 products, 4 sines."""
-    network = siren.init((2 * 2 * 3, 4, 3), 3.0, 3.0, seed=1)
-    return Model(network, ("color",), Window(2, "clamp"), Normalization())
+    return untrained((4,), ("color",), 2)
 
 
 def test_a_kernel_is_one_stage(model) -> None:

@@ -2,16 +2,17 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
+from kit import untrained
 
 from wamnet.compiler.variants import parse, vary
 from wamnet.kernels.bench import contenders, workload
 from wamnet.kernels.bench.accuracy import Crop
 from wamnet.kernels.bench.contenders import Tools
-from wamnet.refimpl.network import dataset, siren
-from wamnet.refimpl.network.denoise import Model, denoise
-from wamnet.refimpl.network.window import Window
+from wamnet.refimpl.network.denoise import denoise
 from wamnet_peers import peer_onnxruntime, peer_openvino
 
 pytestmark = pytest.mark.apart
@@ -23,15 +24,10 @@ SIZE = 48
 @pytest.fixture(scope="module")
 def model():
     """A network that gives colours inside of [0, 1]."""
-    features, window = ("color", "normal"), Window(4)
-    network = siren.init((dataset.n_inputs(features, window), 8, 8, 3), 1.0, 3.0, seed=1)
-    last = network.biases[-1] * 0 + np.float32(0.5)
-    return Model(
-        siren.Siren((*network.weights[:-1], network.weights[-1] / 4), (*network.biases[:-1], last), 1.0, 3.0),
-        features,
-        window,
-        dataset.Normalization(),
-    )
+    found = untrained((8, 8), omegas=(1.0, 3.0), seed=1)
+    (*weights, last), (*biases, _) = found.siren.weights, found.siren.biases
+    weights, biases = (*weights, last / 4), (*biases, np.full(3, 0.5, np.float32))
+    return replace(found, siren=replace(found.siren, weights=weights, biases=biases))
 
 
 @pytest.mark.parametrize(

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from kit import untrained
 from packages import PACKAGES, needed
 
 from wamnet.compiler.core.lower import lower
@@ -18,10 +19,8 @@ from wamnet.kernels.bench import workload
 from wamnet.kernels.bench.contenders import Tools
 from wamnet.refimpl.errors import ExecutorUnavailable
 from wamnet.refimpl.frame import Frame
-from wamnet.refimpl.network import siren
-from wamnet.refimpl.network.dataset import Normalization
-from wamnet.refimpl.network.denoise import Model, denoise
-from wamnet.refimpl.network.window import Window, all_windows, pad
+from wamnet.refimpl.network.denoise import denoise
+from wamnet.refimpl.network.window import all_windows, pad
 from wamnet_peers import table
 
 pytestmark = [
@@ -57,8 +56,7 @@ def test_a_peer_computes_the_network(peer, border, activation) -> None:
 
     It holds for every order of summation and for fused sums, and so for every library that rounds to nearest.
     """
-    network = siren.init((5 * 5 * 6, 8, 6, 3), 2.0, 3.0, 7, np.float32, activation)
-    model = Model(network, ("color", "normal"), Window(5, border), Normalization())
+    model = untrained((8, 6), size=5, border=border, omegas=(2.0, 3.0), seed=7, activation=activation)
     whole = workload.noise(9)
     frame = Frame({name: layer[:7] for name, layer in whole.layers.items()})
     shown = workload.given(model, frame)

@@ -12,6 +12,7 @@ from pathlib import Path
 import jsonschema
 import numpy as np
 import pytest
+from kit import untrained
 
 from wamnet.compiler.scenes.lower_scene import lower_scene
 from wamnet.compiler.scenes.scene_inputs import tables_of
@@ -25,10 +26,7 @@ from wamnet.refimpl.errors import CompileError, ExecutorUnavailable, InputError
 from wamnet.refimpl.light.render import Job, render
 from wamnet.refimpl.light.scenes import canonical
 from wamnet.refimpl.light.transport import Settings
-from wamnet.refimpl.network import domain, siren
-from wamnet.refimpl.network.dataset import Normalization
-from wamnet.refimpl.network.denoise import Model
-from wamnet.refimpl.network.window import Window
+from wamnet.refimpl.network import domain
 
 pytestmark = pytest.mark.apart  # drivers and runtimes of many targets stay in memory
 
@@ -36,12 +34,11 @@ ROOT = Path(__file__).resolve().parents[3]
 """The repository's root folder."""
 
 
-def model(widths=(96, 8, 3), size=4, features=("color", "normal")):
+def model(hidden=(8,), features=("color", "normal"), size=4):
     """An untrained network whose outputs are near the middle: clipped ones would hide errors."""
-    network = siren.init(widths, 2.0, 2.0, 5, np.float32)
-    middle = np.full(3, 0.5, np.float32)
-    network = replace(network, biases=(*network.biases[:-1], middle))
-    return Model(network, features, Window(size, "clamp"), Normalization(), {})
+    found = untrained(hidden, features, size)
+    biases = (*found.siren.biases[:-1], np.full(3, 0.5, np.float32))
+    return replace(found, siren=replace(found.siren, biases=biases))
 
 
 SCENE = canonical("lone_light")
@@ -290,7 +287,7 @@ def test_other_schedules_keep_the_bound(target, schedule):
 
     Spectra pay for large windows only, and bytes hold integers only.
     """
-    shown = model((864, 8, 3), 12) if schedule.startswith("fft") else model()
+    shown = model(size=12) if schedule.startswith("fft") else model()
     if schedule in targets.BYTES:
         shown = vary(parse("whole8"), shown).model
     try:
@@ -313,7 +310,7 @@ def test_other_schedules_keep_the_bound(target, schedule):
 
 def test_the_usual_schedule_gives_way_and_says_why():
     """A first layer in two passes has more channels between them than a tile holds."""
-    whole = export(Request(model((96, 8, 3)), "cuda", variant="rank6"))
+    whole = export(Request(model(), "cuda", variant="rank6"))
     picked = whole.manifest["kernels"][-1]["schedule"]
     assert (picked["name"], picked["asked"]) == ("plain", "group:4")
     assert "a tile holds 4 channels at once" in picked["reason"]
@@ -353,18 +350,16 @@ def test_a_variant_of_low_rank_is_two_kernels(target):
             "--schedule 'group:4': cannot hold this model: a tile holds 4 channels at once",
         ),
         (
-            Request(model((96, 48, 3)), "glsl-es", weights="uniform"),
+            Request(model((48,)), "glsl-es", weights="uniform"),
             r"GL_MAX_UNIFORM_BLOCK_SIZE 19212: glsl-es takes at most 16384 \(use another place",
         ),
         (
-            Request(model((96, 700, 3)), "glsl-es", weights="inline"),
+            Request(model((700,)), "glsl-es", weights="inline"),
             "weights that a driver compiles in reasonable time 70003: glsl-es takes at most 65536",
         ),
         (Request(model(), "shadertoy", variant="rank2"), "--variant 'rank2': target shadertoy has one pass"),
         (
-            Request(
-                model((16 * 15, 4, 3), 4, ("color", "normal", "albedo", "position", "direction")), "shadertoy"
-            ),
+            Request(model((4,), ("color", "normal", "albedo", "position", "direction")), "shadertoy"),
             "buffers of a Shadertoy, A to D 5: shadertoy takes at most 4",
         ),
     ],
@@ -384,7 +379,7 @@ def test_ways_out_are_those_of_an_export():
             assert not (row.single and limit is row.source and "rank" in limit.way_out)
             assert ":" not in limit.name
     with pytest.raises(CompileError, match="use a smaller rank, or OpenCL or C, which have no such limit"):
-        export(Request(model((96, 48, 3)), "glsl-es", variant="rank20"))
+        export(Request(model((48,)), "glsl-es", variant="rank20"))
 
 
 def test_a_tool_that_is_missing_is_named(monkeypatch, tmp_path):

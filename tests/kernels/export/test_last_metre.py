@@ -6,8 +6,8 @@ import re
 import shutil
 import subprocess
 
-import numpy as np
 import pytest
+from kit import untrained
 
 from wamnet.kernels.bench.workload import random_model
 from wamnet.kernels.export import tools
@@ -16,10 +16,6 @@ from wamnet.kernels.export.targets import TARGETS
 from wamnet.refimpl.errors import ExecutorUnavailable
 from wamnet.refimpl.light.scenes import canonical
 from wamnet.refimpl.light.transport import Settings
-from wamnet.refimpl.network import siren
-from wamnet.refimpl.network.dataset import Normalization
-from wamnet.refimpl.network.denoise import Model
-from wamnet.refimpl.network.window import Window
 
 SETTINGS = Settings(max_depth=1)
 
@@ -74,8 +70,7 @@ def test_all_headers_of_a_rank_are_one_file(compiler, standard, weights, schedul
 @pytest.mark.parametrize("schedule", ["tile:16", "tile:4", "fft:8"])
 def test_each_schedule_is_cpp(schedule, tmp_path):
     """The window is one for which spectra take fewer operations."""
-    network = siren.init((12 * 12 * 3, 32, 3), 2.0, 2.0, 5, np.float32)
-    model = Model(network, ("color",), Window(12, "clamp"), Normalization(), {})
+    model = untrained((32,), ("color",), 12)
     made = export(Request(model, "c", schedule=schedule))
     assert not compiled(made, tmp_path, "c++", "-std=c++17") & {"restrict", "PIXELS", "PLACE"}
 

@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from kit import untrained
 
 from wamnet.compiler.compile import compile_program
 from wamnet.compiler.variants import parse, vary
@@ -14,21 +15,17 @@ from wamnet.kernels.export.host_runner import CRunner, CUDARunner, MetalRunner
 from wamnet.kernels.export.package import Request, export
 from wamnet.refimpl.errors import CompileError, ExecutorUnavailable, InputError
 from wamnet.refimpl.light.transport import Settings
-from wamnet.refimpl.network import siren
-from wamnet.refimpl.network.dataset import Normalization
-from wamnet.refimpl.network.denoise import Model
 from wamnet.refimpl.network.whole import forward_whole
-from wamnet.refimpl.network.window import Window, all_windows, pad
+from wamnet.refimpl.network.window import all_windows, pad
 
 pytestmark = pytest.mark.apart  # a kernel of -Ofast makes its process flush denormal numbers
 
 
 def model(bits=8, border="clamp"):
     """An untrained network in integers, its colours near the middle."""
-    network = siren.init((96, 8, 5, 3), 2.0, 2.0, 5, np.float32)
-    network = replace(network, biases=(*network.biases[:-1], np.full(3, 0.5, np.float32)))
-    found = Model(network, ("color", "normal"), Window(4, border), Normalization(), {})
-    return vary(parse(f"whole{bits}"), found).model
+    found = untrained((8, 5), border=border)
+    biases = (*found.siren.biases[:-1], np.full(3, 0.5, np.float32))
+    return vary(parse(f"whole{bits}"), replace(found, siren=replace(found.siren, biases=biases))).model
 
 
 def made(target, network, **options):

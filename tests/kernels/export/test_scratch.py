@@ -6,17 +6,13 @@ import re
 import shutil
 import subprocess
 
-import numpy as np
 import pytest
+from kit import untrained
 
 from wamnet.compiler.languages.c import stack_bytes
 from wamnet.kernels.export import tools
 from wamnet.kernels.export.hosts.headers import stack_of
 from wamnet.kernels.export.package import Request, export
-from wamnet.refimpl.network import siren
-from wamnet.refimpl.network.dataset import Normalization
-from wamnet.refimpl.network.denoise import Model
-from wamnet.refimpl.network.window import Window
 
 SCHEDULES = ("plain", "tile:16", "fft:16")
 
@@ -62,9 +58,7 @@ int main(void)
 
 def written(folder, schedule):
     """Write the C denoiser of a model whose window is large enough for spectra; return its export."""
-    network = siren.init((864, 32, 32, 3), 2.0, 2.0, 5, np.float32)
-    model = Model(network, ("color", "normal"), Window(12, "clamp"), Normalization(), {})
-    made = export(Request(model, "c", schedule=schedule))
+    made = export(Request(untrained((32, 32), size=12), "c", schedule=schedule))
     for name, data in made.contents().items():
         if name.startswith("denoise/"):
             (folder / name.removeprefix("denoise/")).write_bytes(data)

@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from kit import untrained
 
 from wamnet.compiler.compile import compile_program
 from wamnet.kernels.export import targets, tint_runner
@@ -13,10 +14,6 @@ from wamnet.kernels.export.package import Request, export
 from wamnet.kernels.export.tint_runner import TintRunner
 from wamnet.refimpl.errors import CompileError, ExecutorUnavailable
 from wamnet.refimpl.light.transport import Settings
-from wamnet.refimpl.network import siren
-from wamnet.refimpl.network.dataset import Normalization
-from wamnet.refimpl.network.denoise import Model
-from wamnet.refimpl.network.window import Window
 
 pytestmark = pytest.mark.apart  # drivers of Vulkan stay in memory
 
@@ -31,9 +28,7 @@ def opened(name):
 
 @pytest.fixture(scope="module")
 def exported():
-    network = siren.init((96, 8, 5, 3), 2.0, 2.0, 5, np.float32)
-    model = Model(network, ("color", "normal"), Window(4, "clamp"), Normalization(), {})
-    return export(Request(model, "wgsl", settings=Settings(max_depth=1)))
+    return export(Request(untrained((8, 5)), "wgsl", settings=Settings(max_depth=1)))
 
 
 @pytest.mark.needs("devices")

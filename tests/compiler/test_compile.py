@@ -91,20 +91,6 @@ def test_written_artifact_carries_its_hashes(tmp_path):
     assert raw.size == manifest["weights"]["count"]
 
 
-def test_a_failed_write_leaves_the_old_file(tmp_path, monkeypatch):
-    artifact = compile_program(lower(model()), "opencl")
-    artifacts.write(artifact, tmp_path)
-    before = {path.name: path.read_bytes() for path in tmp_path.iterdir()}
-
-    def breaks(self, target):
-        raise OSError("disk full")
-
-    monkeypatch.setattr(artifacts.Path, "replace", breaks)
-    with pytest.raises(OSError, match="disk full"):
-        artifacts.write(compile_program(lower(model(omega_0=2.0)), "opencl"), tmp_path)
-    assert {path.name: path.read_bytes() for path in tmp_path.iterdir()} == before
-
-
 # ---- refusals ------------------------------------------------------------------------------------------
 
 
@@ -278,55 +264,44 @@ def test_header_and_manifest_say_how_every_image_and_the_output_are_encoded():
     assert "flip" in kernel.source
 
 
-def test_a_disk_that_fills_up_leaves_all_old_files(tmp_path, monkeypatch):
-    artifacts.write(compile_program(lower(model()), "opencl"), tmp_path)
-    before = {path.name: path.read_bytes() for path in tmp_path.iterdir()}
-    real, calls = artifacts.Path.write_bytes, []
+def fill_up(monkeypatch, method, at):
+    """Let a method of paths fail at its call number `at`."""
+    real, calls = getattr(artifacts.Path, method), []
 
-    def fills_up(self, content):
-        calls.append(content)
-        if len(calls) == 3:  # the last of three: the manifest
+    def fails(self, given):
+        calls.append(given)
+        if len(calls) >= at:
             raise OSError("disk full")
-        return real(self, content)
+        return real(self, given)
 
-    monkeypatch.setattr(artifacts.Path, "write_bytes", fills_up)
+    monkeypatch.setattr(artifacts.Path, method, fails)
+
+
+@pytest.mark.parametrize(
+    ("method", "at", "changed"), [("write_bytes", 3, ()), ("replace", 1, ()), ("replace", 2, ("denoise.cl",))]
+)
+def test_a_disk_that_fills_up_leaves_whole_files_and_the_old_manifest(
+    tmp_path, monkeypatch, method, at, changed
+):
+    """At the last of the files, the first name, and the second."""
+    one, two = (compile_program(lower(model(omega_0=omega)), "opencl") for omega in (3.0, 2.0))
+    artifacts.write(one, tmp_path)
+    before = {path.name: path.read_bytes() for path in tmp_path.iterdir()}
+    fill_up(monkeypatch, method, at)
     with pytest.raises(OSError, match="disk full"):
-        artifacts.write(compile_program(lower(model(omega_0=2.0)), "opencl"), tmp_path)
-    assert {path.name: path.read_bytes() for path in tmp_path.iterdir()} == before
+        artifacts.write(two, tmp_path)
+    wanted = {**before, **{name: two.contents()[name] for name in changed}}
+    assert {path.name: path.read_bytes() for path in tmp_path.iterdir()} == wanted
 
 
 def test_a_folder_that_a_full_disk_leaves_empty_goes(tmp_path, monkeypatch):
     """And those above it that were made; one that was there stays."""
-
-    def full(self, content):
-        raise OSError("disk full")
-
-    monkeypatch.setattr(artifacts.Path, "write_bytes", full)
+    fill_up(monkeypatch, "write_bytes", 1)
     (tmp_path / "there").mkdir()
     for folder in (tmp_path / "new" / "deep", tmp_path / "there"):
         with pytest.raises(OSError, match="disk full"):
             artifacts.write(compile_program(lower(model()), "opencl"), folder)
     assert [path.name for path in tmp_path.rglob("*")] == ["there"]
-
-
-def test_failure_at_the_second_name_leaves_whole_files_and_the_old_manifest(tmp_path, monkeypatch):
-    one, two = (compile_program(lower(model(omega_0=omega)), "opencl") for omega in (3.0, 2.0))
-    artifacts.write(one, tmp_path)
-    real, calls = artifacts.Path.replace, []
-
-    def breaks(self, target):
-        calls.append(target)
-        if len(calls) == 2:
-            raise OSError("disk full")
-        return real(self, target)
-
-    monkeypatch.setattr(artifacts.Path, "replace", breaks)
-    with pytest.raises(OSError, match="disk full"):
-        artifacts.write(two, tmp_path)
-    assert (tmp_path / "denoise.cl").read_text() == two.source
-    assert (tmp_path / "weights.bin").read_bytes() == artifacts.weight_bytes(one)
-    assert (tmp_path / "manifest.json").read_text() == artifacts.manifest_text(one)
-    assert len(list(tmp_path.iterdir())) == 4
 
 
 def test_two_writers_at_once_leave_whole_files(tmp_path):

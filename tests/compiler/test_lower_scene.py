@@ -11,11 +11,11 @@ import pytest
 from wamnet.compiler.core.interpret import interpret
 from wamnet.compiler.core.loops import LISTS, STATEMENTS, USUAL
 from wamnet.compiler.core.loops import loops as loops_of
-from wamnet.compiler.scenes.lower_scene import LAYERS, PATH, SURFACE, lower_scene
+from wamnet.compiler.scenes.lower_scene import LAYERS, LIT, PATH, SEEN, SURFACE, lower_scene
 from wamnet.compiler.scenes.values import names
 from wamnet.refimpl import rng
+from wamnet.refimpl.light import following, scenes, transport
 from wamnet.refimpl.light import render as R
-from wamnet.refimpl.light import scenes, transport
 from wamnet.refimpl.light.camera import camera_basis
 from wamnet.refimpl.light.materials import Conductor, Dielectric, Lambertian, Mirror
 from wamnet.refimpl.light.scene import Box, Camera, Light, Quad, Room, Scene, Sphere
@@ -100,9 +100,22 @@ def test_loops_give_the_reference_s_bits(name):
         assert found == [trips for trips in loops for _ in range(results)]
 
 
-def follow(scene, settings, forms):
+@pytest.mark.parametrize("name", ["glossy", "daylight"])
+def test_what_is_seen_past_mirrors_has_the_reference_s_bits(name):
+    """PTK-20: at each vertex, with the paths that are alive; all ways end."""
+    follow(SCENES[name], Settings(max_depth=4), STATEMENTS, seen=True)
+
+
+@pytest.mark.parametrize("forms", [STATEMENTS, LISTS])
+@pytest.mark.parametrize("name", ["minicubes", "glossy", "lone_light", "daylight"])
+def test_shadow_rays_have_the_reference_s_bits(name, forms):
+    """PTK-22: both shadow rays of the first hits."""
+    follow(SCENES[name], Settings(max_depth=1), forms, shadow_rays=2)
+
+
+def follow(scene, settings, forms, **asked):
     """Check all programs of a scene, and return them."""
-    programs = lower_scene(scene, settings, forms)
+    programs = lower_scene(scene, settings, forms, **asked)
     world = transport.build(scene, settings, np.float32)
     y, x = np.divmod(np.arange(16 * 12), 16)
     counters = transport.Counters(rng.counter(7), R.pixel_counter(x, y), rng.counter(3))
@@ -114,9 +127,10 @@ def follow(scene, settings, forms):
     given |= {"seed": counters.seed, "sample_number": counters.sample}
     check(interpret(programs.parts["start"], given), {**components(PATH, path), "pixel": counters.pixel})
     given |= {"pixel": counters.pixel}
+    way, going_on = following.begin(path.direction), np.ones(len(x), bool)
     # Paths that have ended are computed on, in both.
     with np.errstate(all="ignore"):
-        for depth in range(settings.max_depth):
+        for depth in range(settings.max_depth + ("see" in programs.parts)):
             given |= components(PATH, path)
             path, surface, hit = transport.arrive(world, path)
             arrived = {**components(PATH, path), **components(SURFACE, surface, hit)}
@@ -131,6 +145,15 @@ def follow(scene, settings, forms):
                 {n: v for k in LAYERS for n, v in zip(names({k: LAYERS[k]}), layers[k].T, strict=True)},
             )
             given["depth"] = rng.counter(depth)
+            if "shadow" in programs.parts and not depth:
+                check_shadows(programs, world, given, surface, hit, counters)
+            if "see" in programs.parts:
+                given |= {"alive": going_on, "way_going": way.going, "way_length": way.length}
+                seen = interpret(programs.parts["see"], given)
+                on, most = way._replace(going=way.going & going_on), following.most_followed(world)
+                way, layers = following.see(world, on, path, surface, hit, given["depth"], most)
+                wanted = dict(zip(names(SEEN), np.vstack([layers[k].T for k in SEEN]), strict=True))
+                check(seen, {**wanted, "way_going": way.going, "way_length": way.length})
             path, alive = transport.scatter(world, path, surface, hit, given["depth"], counters)
             found, expected = (
                 interpret(programs.parts["scatter"], given),
@@ -142,7 +165,21 @@ def follow(scene, settings, forms):
                 # Where nothing is ever met: the state of paths that have all ended says nothing.
                 found, expected = ({"alive": values["alive"]} for values in (found, expected))
             check(found, expected)
+            going_on &= alive
+    assert "see" not in programs.parts or not way.going.any()
     return programs
+
+
+def check_shadows(programs, world, given, surface, hit, counters):
+    """Check the program of shadow rays at first hits."""
+    counters = counters._replace(sample=np.full_like(counters.pixel, counters.sample))
+    lit = False
+    for number in range(programs.shadow_rays):
+        found = interpret(programs.parts["shadow"], {**given, "shadow_number": rng.counter(number)})
+        wanted = transport.direct(world, surface, hit, counters, programs.shadow_rays, np.uint32(number))
+        check(found, dict(zip(names(LIT), wanted.T, strict=True)))
+        lit |= bool(wanted.any())
+    assert lit
 
 
 def check(found, expected):

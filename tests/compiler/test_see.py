@@ -7,63 +7,22 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from wamnet.compiler.core.interpret import interpret
 from wamnet.compiler.core.passes import pipeline
 from wamnet.compiler.core.profiles import profile_named
 from wamnet.compiler.scenes.encode_kernel import sees
 from wamnet.compiler.scenes.lower_scene import SEEN, FeatureRays, lower_scene
 from wamnet.compiler.scenes.path_kernel import compile_path
 from wamnet.compiler.scenes.scene_inputs import varying
-from wamnet.compiler.scenes.values import names
 from wamnet.compiler.targets import language_named
 from wamnet.kernels.devices.kernel import Part
 from wamnet.kernels.devices.numpy_executor import NumpyExecutor
-from wamnet.refimpl import rng
 from wamnet.refimpl.errors import CompileError
-from wamnet.refimpl.light import following, render, scenes, transport
-from wamnet.refimpl.light.camera import camera_basis
-from wamnet.refimpl.light.transport import Counters, Settings
+from wamnet.refimpl.light import scenes
+from wamnet.refimpl.light.transport import Settings
 
 SETTINGS = Settings(max_depth=3)
 PART = Part(16, 12, 0, 12, 0, 2, 7)
 TARGETS = [("opencl", 1), ("opencl", 16), ("opengl", 1), ("c", 1)]
-
-
-@pytest.mark.parametrize("name", ["glossy", "daylight"])
-def test_the_program_has_the_reference_s_bits(name):
-    """PTK-20: at each vertex of paths of 16 x 12 pixels, with those that are alive."""
-    scene, programs = scenes.canonical(name), lower_scene(scenes.canonical(name), SETTINGS, seen=True)
-    world, basis = transport.build(scene, SETTINGS), camera_basis(scene.camera, np.float32)
-    y, x = np.divmod(np.arange(16 * 12), 16)
-    counters = Counters(rng.counter(7), render.pixel_counter(x, y), rng.counter(3))
-    path = render.start(basis, *(a.astype(np.float32) for a in (x, y)), 16, 12, counters, np.float32)
-    way, most = following.begin(path.direction), following.most_followed(world)
-    assert most == programs.most_followed == 3
-    alive, ends = np.ones(len(x), bool), 0
-    with np.errstate(all="ignore"):
-        for depth in range(SETTINGS.max_depth + 1):
-            path, surface, hit = transport.arrive(world, path)
-            given = {f"point_{c}": surface.point[:, i] for i, c in enumerate("xyz")}
-            given |= {f"normal_{c}": surface.normal[:, i] for i, c in enumerate("xyz")}
-            given |= {f"reflectance_{c}": surface.reflectance[:, i] for i, c in enumerate("rgb")}
-            given |= {f"direction_{c}": path.direction[:, i] for i, c in enumerate("xyz")}
-            given |= {f"beta_{c}": path.beta[:, i] for i, c in enumerate("rgb")}
-            given |= {"t": hit.t, "surface": hit.surface, "alive": alive, "depth": rng.counter(depth)}
-            given |= {"way_going": way.going, "way_length": way.length}
-            found = interpret(programs.parts["see"], given)
-            going = way._replace(going=way.going & alive)
-            way, layers = following.see(world, going, path, surface, hit, rng.counter(depth), most)
-            for layer, values in layers.items():
-                planes = names({layer: SEEN[layer]})
-                for i, plane in enumerate(planes):
-                    expected = values[:, i] if len(planes) > 1 else values
-                    assert np.array_equal(found[plane], expected), plane
-            assert np.array_equal(found["way_going"], way.going)
-            assert np.array_equal(found["way_length"], way.length, equal_nan=True)
-            ends += int((going.going & ~way.going).sum())
-            path, further = transport.scatter(world, path, surface, hit, rng.counter(depth), counters)
-            alive = alive & further
-    assert ends == len(x)
 
 
 @pytest.mark.parametrize("profile", ["ieee", "native"])

@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 from second_meanings import traced
 
-from wamnet.compiler.core.interpret import interpret
 from wamnet.compiler.core.loops import LISTS, STATEMENTS, TREES
 from wamnet.compiler.kernel.run import run_on
 from wamnet.compiler.scenes.emit_path import path_kernel
@@ -17,41 +16,13 @@ from wamnet.compiler.scenes.path_kernel import compile_path
 from wamnet.compiler.scenes.scene_inputs import varying
 from wamnet.kernels.devices.kernel import Part
 from wamnet.kernels.devices.numpy_executor import NumpyExecutor
-from wamnet.refimpl import rng
 from wamnet.refimpl.errors import CompileError
-from wamnet.refimpl.light import render, scenes, transport
-from wamnet.refimpl.light.camera import camera_basis
-from wamnet.refimpl.light.transport import Counters, Settings
+from wamnet.refimpl.light import render, scenes
+from wamnet.refimpl.light.transport import Settings
 
 SETTINGS = Settings(max_depth=1)
 RUN = {"width": 13, "height": 9, "first_row": 2, "rows": 6, "first_sample": 0, "samples": 1, "seed_number": 7}
 """The integers of a launch: a row is not a multiple of any number of lanes but 1."""
-
-
-@pytest.mark.parametrize("forms", [STATEMENTS, LISTS])
-@pytest.mark.parametrize("name", ["minicubes", "glossy", "lone_light", "daylight"])
-def test_the_program_has_the_reference_s_bits(name, forms):
-    """PTK-22: at the first hits of 16 x 12 pixels, of both shadow rays of sample 3."""
-    scene = scenes.canonical(name)
-    programs = lower_scene(scene, SETTINGS, forms, shadow_rays=2)
-    world, basis = transport.build(scene, SETTINGS), camera_basis(scene.camera, np.float32)
-    y, x = np.divmod(np.arange(16 * 12), 16)
-    counters = Counters(rng.counter(7), render.pixel_counter(x, y), np.full(len(x), 3, np.uint32))
-    path = render.start(basis, *(a.astype(np.float32) for a in (x, y)), 16, 12, counters, np.float32)
-    _, surface, hit = transport.arrive(world, path)
-    given = {f"point_{c}": surface.point[:, i] for i, c in enumerate("xyz")}
-    given |= {f"normal_{c}": surface.normal[:, i] for i, c in enumerate("xyz")}
-    given |= {f"reflectance_{c}": surface.reflectance[:, i] for i, c in enumerate("rgb")}
-    given |= {"t": hit.t, "surface": hit.surface, "seed": np.full(len(x), 7, np.uint32)}
-    given |= {"pixel": counters.pixel, "sample_number": counters.sample}
-    lit = 0
-    for number in range(2):
-        found = interpret(programs.parts["shadow"], {**given, "shadow_number": rng.counter(number)})
-        wanted = transport.direct(world, surface, hit, counters, 2, np.uint32(number))
-        for i, c in enumerate("rgb"):
-            assert np.array_equal(np.broadcast_to(found[f"direct_{c}"], len(x)), wanted[:, i])
-        lit += int(wanted.any(axis=-1).sum())
-    assert (lit > 0) == bool(scene.lights or scene.environment)
 
 
 @pytest.mark.parametrize("target", ["opencl", "opengl", "c", "wgsl"])

@@ -193,12 +193,6 @@ def test_affine_in_any_order_with_and_without_fma(data, n, m, seed, fused):
         assert abs(Fraction(float(total)) - exact) <= Fraction(float(named[row]))
 
 
-@given(low=st.floats(-20, 20), width=st.floats(0, 8), at=st.floats(0, 1))
-def test_sine_range_holds_the_sine(low, width, at):
-    least, most = intervals.sine((np.float64(low), np.float64(low + width)))
-    assert least <= np.sin(low + at * width) <= most
-
-
 @pytest.mark.parametrize(
     ("low", "high", "wanted"),
     [

@@ -111,34 +111,6 @@ def test_what_a_group_does_not_hold_is_plain_with_the_reason(program, reason):
     assert ("group" in found) == (found["name"] == "group:1")
 
 
-@given(
-    channels=st.lists(st.integers(1, 4), min_size=1, max_size=3),
-    size=st.integers(1, 3),
-    hidden=st.integers(1, 30),
-)
-def test_groups_find_every_weight(channels, size, hidden):
-    """Read the array as the kernel's loops do: image, four channels, tap, channel."""
-    network = siren.init((size * size * sum(channels), hidden, 3), 3.0, 3.0, seed=1, dtype=np.float32)
-    program = gathered(lambda x: denoise_pixel(network, x), channels, size)
-    group = language_named("opencl").schedules["group:4"]
-    packed, layout = group.pack(program), group.layout(program)
-    for name, slot in layout.items():
-        assert slot.offset % 4 == 0
-        array = program.parameters[name]
-        vectors = -(-array.shape[0] // 4)
-        if array.shape != network.weights[0].shape:
-            continue
-        read, at = np.zeros_like(array), slot.offset
-        for image, count in enumerate(channels):
-            for first in range(0, count, 4):
-                for tap in range(size * size):
-                    for c in range(first, min(first + 4, count)):
-                        column = tap * sum(channels) + sum(channels[:image]) + c
-                        read[:, column] = packed[at : at + array.shape[0]]
-                        at += 4 * vectors
-        assert np.array_equal(read, array)
-
-
 def test_golden_inlined(golden):
     golden("inlined.denoise.frag", compile_program(small(), "opengl", "inlined").source)
 

@@ -174,32 +174,6 @@ def test_the_text_of_grouped_dots(golden, dialect) -> None:
     golden(f"groupdot.denoise{dialect.suffix}", found)
 
 
-@pytest.mark.parametrize("channels", [{"a": 3, "b": 1}, {"a": 2, "b": 17}])
-def test_the_words_of_grouped_dots_are_the_weights(channels) -> None:
-    """Read the array as the kernel does: four words at a time, tap by tap, word by word."""
-    found, held = smallest(channels), sum(channels.values())
-    tiny = GroupDot(CUDA(), "groupdot:1", "a tiny group", pixels=1, group=(4, 2))
-    packed, slots = tiny.pack(found), tiny.layout(found)
-    windowed = True
-    for name, matrix in found.parameters.items():
-        if matrix.ndim != 2:
-            continue
-        read, at = np.zeros_like(matrix), slots[name].offset
-        count, taps = (held, range(4)) if windowed else (matrix.shape[1], range(1))
-        words = range(-(-count // 4))
-        for first in words[::4]:
-            for tap in taps:
-                for word in words[first : first + 4]:
-                    found_bytes = packed[at : at + 4].view(np.int8).reshape(4, 4)
-                    inputs = [i for i in range(4 * word, 4 * word + 4) if i < count]
-                    read[:, [tap * count + i for i in inputs]] = found_bytes[:3, : len(inputs)]
-                    assert not found_bytes[3].any(), "no neuron, no weight"
-                    assert not found_bytes[:, len(inputs) :].any(), "what fills a word up is 0"
-                    at += 4
-        assert np.array_equal(read, matrix)
-        windowed = False
-
-
 def test_a_tile_of_words_takes_a_quarter() -> None:
     """Five channels are two words of a pixel; 21 are six, of which four are in the tile at once."""
     for channels, words in (({"a": 3, "b": 2}, 2), ({"a": 4, "b": 17}, 4)):
@@ -212,30 +186,6 @@ def test_the_text_of_dots(golden) -> None:
     for dialect in (C(), OpenCL()):
         tiny = Dot(dialect, "dot:4", "a tiny tile", lanes=4, pixels=2)
         golden(f"dot4.denoise{dialect.suffix}", tiny.renderer(found, True).source(["a tiny kernel"]))
-
-
-def test_the_bytes_of_dots_are_the_weights() -> None:
-    """Each weight is once among the bytes; the others are 0, and sums begin at -128 times a row's sum."""
-    net = rounded(siren.init((2 * 2 * 4, 5, 3), 1.0, 5.0, seed=2), 2)
-    images = tuple(Image(name, n, -LARGEST, LARGEST, whole=True) for name, n in CHANNELS.items())
-    found = analysed(
-        trace(
-            lambda x: forward_whole(net, x), {"window": Type(shape=(16,))}, Gather(Window(2, "clamp"), images)
-        )
-    )
-    dot = Dot(C(), "dot:4", "a tiny tile", lanes=4, pixels=2)
-    packed, slots = dot.pack(found), dot.layout(found)
-    assert packed.size == sum(int(np.prod(slot.shape)) for slot in slots.values())
-    for name, matrix in found.parameters.items():
-        if matrix.ndim != 2:
-            continue
-        slot = slots[name]
-        held = packed[slot.offset : slot.offset + int(np.prod(slot.shape))].view(np.int8)
-        assert sorted(held[held != 0]) == sorted(matrix[matrix != 0].astype(np.int8).ravel())
-        start = slots[f"{name}start"]
-        begun = packed[start.offset : start.offset + start.shape[0]].view(np.int32)
-        assert begun[: len(matrix)].tolist() == (-128 * matrix.sum(axis=1)).astype(int).tolist()
-        assert not begun[len(matrix) :].any()
 
 
 @pytest.mark.parametrize("schedule", ["dot:16", "groupdot:4"])

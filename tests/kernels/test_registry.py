@@ -13,11 +13,23 @@ from wamnet.kernels.devices import registry
 from wamnet.refimpl.errors import ExecutorUnavailable, InputError
 
 
-def test_unknown_executor():
-    with pytest.raises(
-        InputError, match=r"executor 'metal': unknown \(choose one of numpy, opencl, opengl, c"
-    ):
-        kernels.open_executor("metal")
+@pytest.mark.parametrize(
+    ("needed", "name", "options", "message"),
+    [
+        ("numpy", "metal", {}, r"executor 'metal': unknown \(choose one of numpy, opencl, opengl, c"),
+        ("opencl", "opencl", {"device": "abacus"}, "no device matches 'abacus'; choose a part of one of: "),
+        (
+            "opengl-egl",
+            "opengl",
+            {"context": "glx"},
+            "context 'glx': unknown .choose one of auto, egl",
+        ),
+    ],
+)
+def test_what_is_not_there_is_told_with_the_choices(executor_named, needed, name, options, message):
+    executor_named(needed)
+    with pytest.raises((InputError, ExecutorUnavailable), match=message):
+        kernels.open_executor(name, **options)
 
 
 @pytest.mark.parametrize(("name", "package"), [("opencl", "pyopencl"), ("opengl", "moderngl")])
@@ -35,12 +47,6 @@ def test_missing_package_is_named_with_the_way_to_get_it(monkeypatch, name, pack
         ExecutorUnavailable, match=rf"{name}: package {package} .* pip install 'wamnet\[{name}\]'"
     ):
         kernels.open_executor(name)
-
-
-def test_opencl_device_that_does_not_exist(executor_named):
-    executor_named("opencl")
-    with pytest.raises(ExecutorUnavailable, match="no device matches 'abacus'; choose a part of one of: "):
-        kernels.open_executor("opencl", device="abacus")
 
 
 def test_opencl_device_is_chosen_by_a_part_of_its_name(executor_named, monkeypatch):
@@ -183,12 +189,6 @@ def test_opencl_platform_that_fails_is_passed_over(executor_named, monkeypatch):
     monkeypatch.setattr(opencl_executor.cl, "get_platforms", lambda: [Broken(), *real])
     with kernels.open_executor("opencl") as executor:
         assert executor.device == device
-
-
-def test_unknown_opengl_context(executor_named):
-    executor_named("opengl-egl")
-    with pytest.raises(InputError, match=r"OpenGL context 'glx': unknown \(choose one of auto, egl, osmesa"):
-        kernels.open_executor("opengl", context="glx")
 
 
 @pytest.mark.parametrize(("newest", "asked"), [(430, [430]), (330, [430, 330])])

@@ -84,7 +84,9 @@ class Turns:
     def added(self, cells: Cells, element: Any) -> None:
         """Note elements that several turns add to; `Race` where one of them has read or written these."""
         _, owner, reads = self.users(cells)
-        if (owner[element] > NOBODY).any() or any(np.isin(element, own).any() for own, _ in reads):
+        if element.size and (
+            (owner[element] > NOBODY).any() or any(np.isin(element, own).any() for own, _ in reads)
+        ):
             raise Race
         owner[element] = ADDED
 

@@ -66,7 +66,7 @@ class Language:
         return self.profile.sine or self.dialect.native_sine
 
     def under(self, name: str) -> Language:
-        """Return the language under another numerical profile."""
+        """Return the language under a numerical profile; CompileError lists those that exist."""
         return self if name == self.profile.name else _with_profile(self, name)
 
     def __reduce__(self) -> tuple[Any, ...]:

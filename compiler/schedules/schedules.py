@@ -225,12 +225,12 @@ def pick(schedules: Mapping[str, Schedule], name: str, program: Program) -> tupl
     """Return the schedule of this name, or the one in its place that holds the program, with the reason."""
     if name not in schedules:
         raise CompileError(f"schedule {name!r}: unknown to this target ({remedy(name, schedules)})")
-    last, first = next(iter(schedules)), ""
-    while name != last and (reason := schedules[name].refusal(program)):
+    plain, first = next(iter(schedules)), ""
+    while name != plain and (reason := schedules[name].refusal(program)):
         first = first or reason
         name = schedules[name].instead
     chosen = schedules[name]
-    if name == last and (reason := chosen.impossible(program)):
+    if name == plain and (reason := chosen.impossible(program)):
         raise CompileError(
             f"no schedule of this target can run the program: {reason}; compile for another target"
         )

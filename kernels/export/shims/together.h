@@ -1,5 +1,3 @@
-#include <barrier>
-#include <thread>
-#include <vector>
-static std::barrier<> *wamnet_barrier;
-static inline void wamnet_wait() { wamnet_barrier->arrive_and_wait(); }
+#include <pthread.h>
+static pthread_barrier_t wamnet_barrier;
+static inline void wamnet_wait() { pthread_barrier_wait(&wamnet_barrier); }

@@ -13,7 +13,9 @@ from wamnet.compiler.artifact import schedule_text
 from wamnet.compiler.compile import compile_program
 from wamnet.compiler.core.ir import Gather, Image, Type
 from wamnet.compiler.core.trace import trace
+from wamnet.compiler.languages.glsl_es import GLSLES
 from wamnet.compiler.schedules.names import FORMER, parse, split
+from wamnet.compiler.schedules.plain import WEIGHTS_A_TEXEL, Packed
 from wamnet.compiler.schedules.schedules import LARGEST_PRIVATE
 from wamnet.compiler.schedules.straight import LARGEST_WEIGHTS
 from wamnet.compiler.schedules.tile import Tile
@@ -269,3 +271,35 @@ def test_products_may_be_fused_in_tiles_of_c_only():
         source = compile_program(small(), "c", schedule=schedule).source
         assert f'#pragma GCC optimize("fp-contract={word}")' in source
         assert f"#pragma STDC FP_CONTRACT {'ON' if word == 'fast' else 'OFF'}" in source
+
+
+# ---- weights by four -------------------------------------------------------------------------------------
+
+
+@pytest.fixture(scope="module")
+def program(kit):
+    """Nine taps of a channel to five neurons to three."""
+    return kit.denoiser(kit.network([9, 5, 3], (3.0, 3.0)), {"a": 1}, 3, "clamp")
+
+
+def test_rows_of_neurons_are_filled_up_to_whole_texels(program):
+    schedule = Packed(GLSLES())
+    packed, slots = schedule.pack(program), schedule.layout(program)
+    assert packed.size % 4 == 0
+    for name, array in program.parameters.items():
+        slot = slots[name]
+        assert slot.offset % 4 == 0
+        stored = packed[slot.offset : slot.offset + np.prod(slot.shape)].reshape(slot.shape)
+        neurons = len(array)
+        assert np.array_equal(stored[..., :neurons], array.T)
+        assert slot.shape[-1] % 4 == 0
+        assert not stored[..., neurons:].any()
+    assert slots["W0"].shape == (9, 8)
+
+
+def test_a_packed_kernel_says_how_its_texture_is_read(program):
+    artifact = compile_program(program, "glsl-es", schedule="packed")
+    assert artifact.manifest["schedule"][WEIGHTS_A_TEXEL] == 4
+    assert "weight_texture: RGBA32F, 1024 texels wide" in artifact.source
+    assert Packed(GLSLES()).refusal(program) == ""
+    assert Packed(GLSLES()).private_bytes(program) > 0

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import tracemalloc
 
 import numpy as np
 import pytest
@@ -202,3 +203,30 @@ def test_the_message_lists_what_can_be_traced():
     with pytest.raises(CompileError, match=r"np\.log cannot be traced; use only") as caught:
         traced(np.log)
     assert all(name in str(caught.value) for name in TRACEABLE)
+
+
+# ---- what the interpreter holds --------------------------------------------------------------------------
+
+STEPS = 40
+"""Operations one after another."""
+
+
+def test_values_are_dropped_after_their_last_use():
+    """Two numbers a step, of which the next needs one; all of them once took gigabytes of a benchmark."""
+
+    def chain(x):
+        for _ in range(STEPS):
+            x = np.sin(x) + 1.0
+        return x
+
+    program = trace(chain, {"x": Type(shape=())})
+    given = np.zeros(2**18, np.float32)
+    tracemalloc.start()
+    try:
+        (found,) = interpret(program, {"x": given}).values()
+        _, peak = tracemalloc.get_traced_memory()
+    finally:
+        tracemalloc.stop()
+    assert found.shape == given.shape
+    # The operand, the result, and a temporary of an operation.
+    assert peak < 4 * given.nbytes

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import multiprocessing
+import threading
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
+from wamnet.kernels.run import render_pool
 from wamnet.kernels.run.render_frame import RENDERERS, render_frame
 from wamnet.refimpl.errors import InputError
 from wamnet.refimpl.light.environment import sun_of
@@ -94,3 +97,20 @@ def test_an_unknown_executor_is_refused() -> None:
     text = r"executor that renders 'abacus': unknown \(choose one of numpy"
     with pytest.raises(InputError, match=text):
         render_frame("abacus", SCENE, Job(2, 2))
+
+
+# ---- the pool of processes -------------------------------------------------------------------------------
+
+
+def test_an_interrupt_leaves_neither_threads_nor_processes(monkeypatch) -> None:
+    """A thread of the pool that closes its pipes while the interpreter ends is a traceback after the end."""
+
+    def interrupt(*_arguments: object) -> None:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(render_pool, "_watch", interrupt)
+    threads, processes = set(threading.enumerate()), set(multiprocessing.active_children())
+    with pytest.raises(KeyboardInterrupt):
+        render_pool.render_parallel(canonical("cornell"), Job(512, 512, 4), workers=2)
+    assert set(threading.enumerate()) <= threads
+    assert set(multiprocessing.active_children()) <= processes

@@ -67,16 +67,6 @@ def test_lowered_model_is_the_reference():
     assert np.array_equal(interpret(lower(small), {"window": x})["color"], denoise_pixel(small.siren, x))
 
 
-def test_weights_are_packed_input_major():
-    program = lower(model())
-    plain = language_named("opencl").schedules["plain"]
-    slots, packed = plain.layout(program), plain.pack(program)
-    for name, array in program.parameters.items():
-        slot = slots[name]
-        assert np.array_equal(packed[slot.offset : slot.offset + array.size].reshape(slot.shape), array.T)
-    assert packed.size == sum(array.size for array in program.parameters.values())
-
-
 def test_written_artifact_carries_its_hashes(tmp_path):
     artifact = compile_program(lower(model()), "opencl")
     written = artifacts.write(artifact, tmp_path / "new")

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from wamnet.compiler.core.interpret import interpret
-from wamnet.compiler.core.ir import Type, text
-from wamnet.compiler.core.loops import bodies, loops
+from wamnet.compiler.core.ir import Type
+from wamnet.compiler.core.loops import loops
 from wamnet.compiler.core.passes import pipeline
 from wamnet.compiler.core.passes.fold import fold, fold_float32
 from wamnet.compiler.core.passes.rewrite import eliminate_dead, scalarize
@@ -109,27 +109,6 @@ def test_the_plain_loop_is_the_definition():
     assert plain[1] == ((0, 1, 3), 2, 4)
     with pytest.raises(ValueError, match="shorter"):
         vectors.fold_rows(step, (tables[0], np.array([3])), (0,))
-
-
-def test_a_short_loop_as_text():
-    program = traced(
-        lambda x: vectors.fold_rows(lambda v, a: (v[0] + a * x[..., 1],), (NUMBERS,), (x[..., 0],))[0]
-    )
-    assert text(program).splitlines()[1:10] == [
-        "  %0 = input {name=x, type=float32[3]} : float32[3]",
-        "  %1 = component %0 {index=0} : float32",
-        "  %2 = carried %1 {index=0, loop=0} : float32",
-        "  %3 = row {loop=0, table=T0} : float32",
-        "  %4 = component %0 {index=1} : float32",
-        "  %5 = multiply %3, %4 : float32",
-        "  %6 = add %2, %5 : float32",
-        "  %7 = loop %2, %6 {index=0, loop=0, trips=5} : float32",
-        "  output color = %7",
-    ]
-    assert [sorted(numbers) for numbers in bodies(program)] == [[], [], [0], [0], [], [0], [0], []]
-    ends, in_bodies = loops(program)
-    assert (list(ends), sorted(in_bodies)) == ([7], [3, 5, 6])
-    assert (ends[7].carried, ends[7].after, ends[7].body) == ((2,), (6,), (3, 5, 6))
 
 
 def test_what_does_not_depend_on_the_row_is_outside():

@@ -13,7 +13,6 @@ from wamnet.compiler.core.interpret import interpret
 from wamnet.compiler.plan import analysed, plan_program
 from wamnet.compiler.proof import bounds
 from wamnet.compiler.targets import DENOISERS, language_named
-from wamnet.kernels import open_executor
 from wamnet.refimpl.errors import CompileError
 
 CHANNELS = {"a": 2, "b": 1}
@@ -75,22 +74,6 @@ def test_what_promises_nothing_has_no_bound(kit, images):
     assert np.isinf(
         plan_program(program, language_named("opengl").under("native")).expected(images).bound
     ).all()
-
-
-@pytest.mark.parametrize("border", ["clamp", "zero"])
-def test_of_two_passes_rounding_is_bounded(kit, images, border):
-    """The reference has the factors' product for weights: a cut is not an error of the kernel."""
-    program = kit.denoiser(kit.network([27, 5, 3], (3.0, 3.0)), CHANNELS, 3, border)
-    plan = plan_program(program, "numpy", rank=2)
-    found = plan.expected(images)
-    windows = {"window": kit.windows(program, images)}
-    (value,) = interpret(plan.cut.product, windows, np.float64).values()
-    assert np.abs(found.value - value).max() <= 1e-13  # float64 adds up in another order
-    with open_executor("numpy") as executor:
-        (picture,) = [executor.run(compile_plan(plan), images).astype(np.float64)]
-    assert (np.abs(picture - found.value) <= found.bound).all()
-    (with_cut,) = bounds.output_errors(plan.analysed, plan.enclosures(images)).values()
-    assert (with_cut > found.bound).all()
 
 
 def test_a_plan_is_resolved_once(kit, monkeypatch):

@@ -70,21 +70,6 @@ def test_a_kernel_with_inputs_gives_the_bits_of_one_of_constants(name):
     assert np.ptp(expected) > 0 or name == "empty"
 
 
-def test_what_moves_and_what_stays():
-    """The mini cubes: six numbers of a rotation, the camera, and the colours; equal numbers are shared."""
-    inputs = inputs_of("minicubes")
-    firsts = [places[0] for places in inputs.places]
-    groups = {path.partition(".")[0] + "." + path.partition(".")[2].split(".")[0] for path, _ in firsts}
-    assert groups == {"world.geometry", "world.lights", "camera.position", "camera.right", "camera.up"} | {
-        "camera.forward"
-    }
-    assert sum(path == "world.geometry.groups.0.rotation" for path, _ in firsts) == 6
-    shared = [{path for path, _ in places} for places in inputs.places]
-    assert {"world.geometry.emission", "world.lights.radiance"} in shared
-    only_time = varying([at("minicubes", 0.05), at("minicubes", 0.6)], SETTINGS)
-    assert len(only_time.places) == 6
-
-
 def test_a_scene_of_another_form_is_refused():
     """The blocks of `glossy` are not turned at time 0: their group has no rotation."""
     with pytest.raises(CompileError, match=r"its layout differs.*leave these out"):

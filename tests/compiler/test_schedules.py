@@ -6,8 +6,6 @@ import re
 
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 
 from wamnet.compiler.artifact import schedule_text
 from wamnet.compiler.compile import compile_program
@@ -18,7 +16,6 @@ from wamnet.compiler.schedules.names import FORMER, parse, split
 from wamnet.compiler.schedules.plain import WEIGHTS_A_TEXEL, Packed
 from wamnet.compiler.schedules.schedules import LARGEST_PRIVATE
 from wamnet.compiler.schedules.straight import LARGEST_WEIGHTS
-from wamnet.compiler.schedules.tile import Tile
 from wamnet.compiler.targets import TARGETS, language_named
 from wamnet.refimpl.errors import CompileError
 from wamnet.refimpl.network import siren
@@ -208,46 +205,6 @@ def test_what_a_tile_does_not_hold_is_plain_with_the_reason(case, target):
     assert re.match(reason, found.manifest["schedule"]["reason"])
     assert re.search(rf"\(not tile:16: {reason}", schedule_text(found.manifest["schedule"]))
     assert found.source == plain.source
-
-
-@given(
-    schedule=st.sampled_from(
-        [s for t in ("opencl", "c") for s in language_named(t).schedules.values() if type(s) is Tile]
-    ),
-    channels=st.lists(st.integers(1, 4), min_size=1, max_size=3),
-    size=st.integers(1, 3),
-    hidden=st.integers(1, 70),
-)
-def test_every_weight_lies_where_the_kernel_reads_it(schedule, channels, size, hidden):
-    """Read the array as the kernel's loops do, and compare with the matrices; the rest must be 0."""
-    network = siren.init((size * size * sum(channels), hidden, 3), 3.0, 3.0, seed=1, dtype=np.float32)
-    program = gathered(lambda x: denoise_pixel(network, x), channels, size)
-    packed, used = schedule.pack(program), 0
-    window = [
-        (dy * size + dx) * sum(channels) + sum(channels[:image]) + c
-        for image, count in enumerate(channels)
-        for dy in range(size)
-        for dx in range(size)
-        for c in range(count)
-    ]
-    for name, slot in schedule.layout(program).items():
-        assert slot.offset % schedule.lanes == 0
-        array = program.parameters[name]
-        stored = packed[slot.offset :][: np.prod(slot.shape)].reshape(slot.shape)
-        if array.ndim == 2:
-            inputs = window if array.shape == network.weights[0].shape else range(array.shape[1])
-            width = slot.shape[2]
-            found = np.array(
-                [
-                    [stored[j // width, i, j % width] for i in range(len(inputs))]
-                    for j in range(array.shape[0])
-                ]
-            )
-            assert np.array_equal(found, array[:, inputs])
-        else:
-            assert np.array_equal(stored[: array.size], array)
-        used += array.size - np.count_nonzero(array == 0)
-    assert np.count_nonzero(packed) == used
 
 
 @pytest.mark.parametrize(

@@ -9,8 +9,6 @@ from pathlib import Path
 import mpmath
 import numpy as np
 import pytest
-from hypothesis import example, given
-from hypothesis import strategies as st
 
 from wamnet.compiler.core import sine
 from wamnet.compiler.core.enclosure import round_up
@@ -160,18 +158,6 @@ def test_hard_arguments(hard, degree):
     other = sine.cosine(y, degree)
     assert np.max(np.abs(other - cosines)) <= sine.POLYNOMIALS[degree].cosine_error
     assert np.max(np.abs(other)) <= 1
-
-
-@given(
-    x=st.floats(-sine.DOMAIN, sine.DOMAIN, width=32, allow_subnormal=True),
-    degree=st.sampled_from(DEGREES),
-)
-@example(x=1.5707963705062866, degree=9)
-@example(x=-sine.DOMAIN, degree=3)
-def test_any_argument(x, degree):
-    with mpmath.workprec(120):
-        off = abs(mpmath.mpf(float(sine.sine(np.float32(x), degree))) - mpmath.sin(mpmath.mpf(x)))
-    assert off <= ERROR[degree]
 
 
 def fused(a, b, c):

@@ -25,24 +25,6 @@ def ops(program):
     return [node.op for node in program.nodes]
 
 
-def test_a_layer():
-    program = traced(lambda x: np.sin(3.0 * (x @ W.T + B)))
-    lines = text(program).splitlines()
-    assert lines[:9] == [
-        "program",
-        "  %0 = input {name=x, type=float32[3]} : float32[3]",
-        "  %1 = affine %0 {weight=W0} : float32[2]",
-        "  %2 = parameter {name=b0} : float32[2]",
-        "  %3 = add %1, %2 : float32[2]",
-        "  %4 = constant {value=3.0} : float32",
-        "  %5 = multiply %4, %3 : float32[2]",
-        "  %6 = sin %5 : float32[2]",
-        "  output color = %6",
-    ]
-    assert [line.split()[1] for line in lines[9:]] == ["W0:", "b0:"]
-    assert np.array_equal(program.parameters["W0"], W)
-
-
 @pytest.mark.parametrize("n", [1, 2, 7, 8, 9, 17, 30])
 def test_a_sum_has_the_order_of_numpy(n):
     """To the bit, in float32, with numbers of many sizes."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ast
 import inspect
+import itertools
 import json
 from dataclasses import replace
 
@@ -75,19 +76,19 @@ def _leaves(value, place=()):
 
 
 def test_no_stated_number_can_be_another(tmp_path) -> None:
+    """Of one place after the other, less, more and none in turn."""
     path = written(tmp_path)
     held = json.loads(path.read_text())
+    moves = itertools.cycle([lambda n: n - 1, lambda n: n + 1, lambda n: None])
     for place in _leaves({name: held[name] for name in ("ranges", "sums", "bound")}):
         changed = json.loads(path.read_text())
         inner = changed
         for key in place[:-1]:
             inner = inner[key]
-        for moved in (inner[place[-1]] - 1, inner[place[-1]] + 1, None):
-            before, inner[place[-1]] = inner[place[-1]], moved
-            path.write_text(json.dumps(changed))
-            with pytest.raises(Refused, match="must be"):
-                check(path)
-            inner[place[-1]] = before
+        inner[place[-1]] = next(moves)(inner[place[-1]])
+        path.write_text(json.dumps(changed))
+        with pytest.raises(Refused, match="must be"):
+            check(path)
     path.write_text(json.dumps(held))
     check(path)
 

@@ -4,7 +4,7 @@ from dataclasses import replace
 from fractions import Fraction
 
 import numpy as np
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from wamnet.compiler.core import sums
@@ -115,6 +115,7 @@ def network(seed, widths, omega_0, scale, activation="sine"):
     )
 
 
+@settings(max_examples=settings.default.max_examples // 4)
 @given(
     seed=st.integers(0, 2**31 - 1),
     omega_0=st.sampled_from([1.0, 3.0, 10.0, 30.0]),

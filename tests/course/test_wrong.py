@@ -9,8 +9,8 @@ from wamnet_course.labs import LABS
 
 pytestmark = pytest.mark.needs("programs")  # answers run in processes of their own
 
-STEP = 6
-"""Every sixth wrong answer of a lab is asked at once."""
+STEP = 12
+"""Every twelfth wrong answer of a lab is asked at once."""
 
 WITHOUT = {("extra2_rewrite", "old operands")}
 """What is caught and gets another explanation."""

@@ -112,12 +112,12 @@ def test_every_step_is_within_its_range(executor, name):
 
 @pytest.mark.nightly(but="numpy")
 def test_a_long_run_of_roulette(executor):
-    """Twenty scatterings in a nearly white room, most of them under roulette, on a few paths."""
-    settings = Settings(max_depth=20, roulette_depth=2)
+    """Ten scatterings in a nearly white room, most of them under roulette, on a few paths."""
+    settings = Settings(max_depth=10, roulette_depth=2)
     scene = validate(SCENES["a closed room that is nearly white"])
     report = compare_paths.compare_paths(executor, scene, settings, View(4, 2, seed=1))
     assert report.passed, [str(example) for example in report.examples]
-    assert len(report.depths) == 21
+    assert len(report.depths) == 11
     assert report.depths[-1].paths > 0
 
 

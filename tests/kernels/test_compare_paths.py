@@ -21,7 +21,7 @@ from wamnet.refimpl.light.shapes import quad
 from wamnet.refimpl.light.shapes.shape import MISS
 from wamnet.refimpl.light.transport import Settings
 
-VIEW = View(48, 32, seed=5)
+VIEW = View(32, 24, seed=5)
 
 SMALL = View(32, 16, seed=5)
 
@@ -81,13 +81,13 @@ def test_paths_are_those_of_the_reference(executor, name):
     assert report.passed, [str(example) for example in report.examples]
     assert report.examples == ()
     assert [depth.depth for depth in report.depths] == [0, 1, 2]
-    assert report.depths[0].paths == 48 * 32
+    assert report.depths[0].paths == 32 * 24
     for depth in report.depths:
         assert depth.unexplained == 0
-        assert depth.different <= depth.undecided <= 0.01 * 48 * 32
+        assert depth.different <= depth.undecided <= 0.01 * 32 * 24
         assert set(depth.gaps) == set(QUANTITIES)
         assert all(gap.ratio <= 1 for gap in depth.gaps.values())
-    assert report.depths[-1].parted <= 0.01 * 48 * 32
+    assert report.depths[-1].parted <= 0.01 * 32 * 24
 
 
 @pytest.mark.product

@@ -102,10 +102,7 @@ def rewrite(path: Path, block: Block, printed: str) -> None:
     path.write_text(after[:start] + printed + after[start + len(str(block.printed)) :])
 
 
-USUAL = (
-    "README.md", "docs/guide/install.md", "docs/guide/python.md", "docs/guide/hosts.md",
-        "docs/first-kernel.md",
-)  # fmt: skip
+USUAL = ("README.md", "docs/guide/install.md", "docs/guide/python.md", "docs/first-kernel.md")
 """Documents whose commands run in every run; the others take minutes together."""
 
 

@@ -82,10 +82,10 @@ class Turns:
         return before <= who
 
     def added(self, cells: Cells, element: Any) -> None:
-        """Note elements that several turns add to; `Race` where one of them has read or written these."""
+        """Note elements that all turns add to once; `Race` where one has used these, or they added before."""
         _, owner, reads = self.users(cells)
         if element.size and (
-            (owner[element] > NOBODY).any() or any(np.isin(element, own).any() for own, _ in reads)
+            (owner[element] != NOBODY).any() or any(np.isin(element, own).any() for own, _ in reads)
         ):
             raise Race
         owner[element] = ADDED

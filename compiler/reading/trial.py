@@ -313,17 +313,17 @@ class Trial(Values):
         writes = any(isinstance(each, Store) and each.array == RESULT for each in walk(loop.body))
         count, written = len(turns), self.written.copy() if writes else None
         slot = None if outer.slot is None else np.repeat(outer.slot, count)
-        self.turns = Turns(outer.count * count, slot, undoes=True, ordered=outer.count == 1)
+        self.turns = own = Turns(outer.count * count, slot, undoes=True, ordered=outer.count == 1)
         self.names = {key: _repeated(value, count) for key, value in names.items()}
         self.names[loop.name] = np.tile(np.array(turns, dtype=np.int64), outer.count)[None]
         self.mask, self.looking = (_repeated(each, count) for each in lanes)
         self.memory = {key: _repeated(each, count) for key, each in memory.items()}
         try:
             self.body(loop.body)
-            self.turns.end(outer)
+            own.end(outer)
             return True
         except (Race, Wrong, Unread):  # the last two may be of turns that need the one before
-            self.turns.restore()
+            own.restore()  # `self.turns` may be those of a sum
             self.apart[id(loop), outer.count] += 1
             self.size = size
             if written is not None:

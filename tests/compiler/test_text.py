@@ -335,6 +335,19 @@ def test_sums_of_all_turns_are_those_of_each(plain, new):
         run_text(*changed(plain, f"part1[j] += {PRODUCT};", new))
 
 
+def test_a_sum_that_turns_never_have_is_not_a_part(plain):
+    """TXT-3, TXT-10: each column adds its products, and then the whole of a row of the other image."""
+    kept = changed(plain, "part1[6];", "part1[6]; float part_1[18];")
+    kept = changed(kept, "v1[j] += part1[j];", "part_1[dy * 6 + j] = part1[j];")
+    row = "for (int j = 0; j < 6; ++j) { part1[j] += part_1[dx * 6 + j]; }"
+    (end,) = re.findall(r"\(tap \+ 3 \+ c\) \* 6 \+ j\][^}]*}\s*}\n", kept[0])
+    with pytest.raises(Refused, match=r"image normal, row 0 are never made|sums of %1 are never made"):
+        run_text(*changed(kept, end, f"{end} if (dy == 0) {{ {row} }}"))
+    row = f"for (int dx = 0; dx < 3; ++dx) {{ {row} }}"
+    (end,) = re.findall(r"\(tap \+ 3 \+ c\) \* 6 \+ j\](?:[^}]*}){3}\n", kept[0])
+    assert run_text(*changed(kept, end, f"{end} if (dy == 0) {{ {row} }}"))
+
+
 def test_constants_of_type_double_are_not_read(plain):
     """C takes 0.5 for a double; GLSL takes it for a float."""
     with pytest.raises(Unread, match="begins with no token"):

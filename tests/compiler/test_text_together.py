@@ -130,7 +130,13 @@ def test_turns_inside_turns_have_used_what_these_use():
 @pytest.mark.parametrize("inside", [False, True])
 @pytest.mark.parametrize("first", [0, 1])
 @pytest.mark.parametrize(
-    "use", [get, lambda cells, turns, place: put(cells, turns, place, 1, 2)], ids=["read", "write"]
+    "use",
+    [
+        get,
+        lambda cells, turns, place: put(cells, turns, place, 1, 2),
+        lambda cells, turns, place: turns.added(cells, np.array(place)),
+    ],
+    ids=["read", "write", "add"],
 )
 @pytest.mark.parametrize("ordered", [True, False])
 def test_what_turns_add_to_they_do_not_use(inside, first, use, ordered):

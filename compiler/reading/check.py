@@ -194,7 +194,7 @@ def check_items(manifest: Any, tiles: bool) -> None:
     right = right and in_passes == {name.startswith("fftpasses")}
     if not right or (family == "group" and str(items[0]) != pixels):
         raise Wrong(f"its manifest has other work items than schedule {name}")
-    title = "GLSL 4.30" if target == "opengl" and name != "plain" else TITLES[target]
+    title = "GLSL 4.30" if target == "opengl" and family not in ("plain", "inlined") else TITLES[target]
     if not manifest["language"].startswith(title):
         raise Wrong(f"its manifest has language {manifest['language']!r} for target {manifest['target']}")
     if items[1] != 1 and not tiles:

@@ -67,7 +67,7 @@ class Claim:
         self.sine = partial(sine, degree=int(degree[1])) if degree else None
         self.arrays, inside = parameters_of(held, raw), ["base64" in p for p in self.parameters.values()]
         self.stated = self.exact and all(inside)
-        if any(inside) and not (tiles or self.stated):
+        if any(inside) and self.count and not (tiles or self.stated):
             raise Unread("weights that the file does not hold")
         self.ranges = Ranges(held, self.arrays if self.exact else {}, self.stated)
         self.spectra = tiles.range if tiles else range(0)

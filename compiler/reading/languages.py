@@ -15,8 +15,8 @@ BUFFERS = dict.fromkeys(("glsl-vulkan", "wgsl", "cuda", "metal"), ("group", "til
 """Languages of which work groups and register tiles are read, and of floats FFT passes."""
 
 OF_FLOATS: Mapping[str, tuple[str, ...]] = {
-    **dict.fromkeys(BUFFERS, ("group", "tile", "fftpasses")), "opengl": ("group", "fftpasses"),
-    "opencl": ("tile", "vector", "group", "fft"), "c": ("tile", "fft"), "glsl-es": ("packed",),
+    **dict.fromkeys(BUFFERS, ("group", "tile", "fftpasses")), "opengl": ("group", "fftpasses", "inlined"),
+    "opencl": ("tile", "vector", "group", "fft"), "c": ("tile", "fft"), "glsl-es": ("packed", "inlined"),
 }  # fmt: skip
 """What the names of schedules other than plain begin with, of networks of floats."""
 

@@ -203,7 +203,7 @@ class Values(Walker):
             return self.numbers[key]
         found = stacked([self._term(self.value(each), value.type.dtype) for each in value.args])
         if all(each.op == "const" for each in value.args):
-            if self.dual and any(each.value for each in value.args):  # a column of weights
+            if (self.dual or not self.claim.count) and any(each.value for each in value.args):  # weights
                 found = Term(found.shape, draw=found.value)
             self.numbers[key] = found
         return found

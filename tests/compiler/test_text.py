@@ -58,12 +58,44 @@ def test_register_tiles_compute_what_is_certified(target, schedule, activation, 
 
 
 @pytest.mark.parametrize(
-    ("target", "schedule"), [("glsl-es", "packed"), ("opengl", "group:1"), ("opengl", "group:4")]
-)
-def test_shaders_with_weights_in_texels_or_groups_compute_what_is_certified(target, schedule, tmp_path):
+    ("target", "schedule"),
+    [
+        ("glsl-es", "packed"), ("opengl", "group:1"), ("opengl", "group:4"), ("glsl-es", "inlined"),
+        ("opengl", "inlined"),
+    ],
+)  # fmt: skip
+def test_shaders_with_other_weights_or_groups_compute_what_is_certified(target, schedule, tmp_path):
     """TXT-7: every schedule of a language whose weights are read."""
     pixels = 4 if schedule == "group:4" else 1
     assert check_text(kernel(tmp_path, target, schedule))["sums"] == pixels * 9
+
+
+def after(text):
+    """Return the text of the next float32."""
+    return f"{np.nextafter(np.float32(text.strip('()f')), np.float32(np.inf)):.9g}f"
+
+
+@pytest.mark.parametrize(
+    "changed_line",
+    [
+        lambda line, a, b: line.replace(a, after(a)),
+        lambda line, a, b: line.replace(a, "?").replace(b, a).replace("?", b),
+        lambda line, a, b: line.replace(a, "0.0f"),
+        lambda line, a, b: line.replace("color.x", "color.y"),
+        lambda line, a, b: line.replace("part1_0", "part1_1"),
+        lambda line, a, b: f"{line} {line}",
+        lambda line, a, b: line.replace("+=", "-="),
+        lambda line, a, b: "",
+        lambda line, a, b: line.replace(") *", ") * 1.0f *"),
+        lambda line, a, b: f"if (x > 0) {{ {line} }}",
+    ],
+)
+def test_wrong_constants_are_refused(changed_line, tmp_path):
+    """TXT-7: weights that are constants are those of the certificate, to the bit, each in its place."""
+    given = parts(kernel(tmp_path, "opengl", "inlined"))
+    line, a, b = re.search(r"part1_0 \+= vec4\(([^ ]+), ([^ ]+), .*\* color\.x;", given[0]).group(0, 1, 2)
+    with pytest.raises((Refused, Unread), match=r"\S"):
+        run_text(*changed(given, line, changed_line(line, a, b)))
 
 
 @pytest.mark.parametrize("target", ["c", "cuda", "opencl", "opengl", "wgsl"])

@@ -13,7 +13,7 @@ from wamnet.refimpl.light.intersection import build as lay_out
 from wamnet.refimpl.light.intersection import closest_hit
 from wamnet.refimpl.light.materials import Mirror
 from wamnet.refimpl.light.render import Job
-from wamnet.refimpl.light.scene import Box, Camera, Light, Quad, Room, Scene, Sphere
+from wamnet.refimpl.light.scene import Box, Camera, Quad, Scene, Sphere
 from wamnet.refimpl.light.scenes import _about_y, canonical
 from wamnet.refimpl.light.variation import Variation, varied
 
@@ -43,15 +43,6 @@ def displacement(moves: H.Motion, cameras, first: H.First, size: int):
 
 
 # ---- primitives and their motion -------------------------------------------------------------------------
-
-
-def test_numbers_follow_the_lists_however_boxes_are_laid_out():
-    """HIS-1: boxes 0 and 2 share a rotation, so that their ids are next to each other; numbers stay."""
-    turned = [Box((0.0, 0.0, -4.0), (1.0,) * 3, WHITE, _about_y(angle)) for angle in (0.1, 0.2, 0.1)]
-    room = Room((-9.0,) * 3, (9.0,) * 3, (WHITE,) * 6)
-    light = Light((0.0, 0.0, -3.0), (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (1.0,) * 3, 1.0)
-    scene = Scene("laid out", CAMERA, room, tuple(turned), lights=(light,))
-    assert H.surface_numbers(scene).tolist() == [0, 1, 2, 3, 4, 5, 6, 8, 7, 9, 10]
 
 
 POSES = {
@@ -147,18 +138,6 @@ def test_what_was_behind_the_camera_is_not_known():
     past, moves, first = by_hand()
     nowhere = (*shifted(0.0, 0.0)[:2], np.zeros((2, 2), bool))
     assert not H.gathered(past, moves, first, nowhere).count.any()
-
-
-def test_nothing_rests_where_the_camera_moves():
-    """HIS-4: an edge is then seen from another place. Otherwise what did not move by itself rests."""
-    scene = canonical("glossy")
-    aside = varied(scene, Variation(yaw_deg=1e-3))
-    assert not H.motion(scene, aside).rests.any()
-    rests = H.motion(scene, canonical("glossy", time=STEP_S)).rests
-    # walls; table, copper and block; the ball in the middle, two others; the mirror, two lamps, nothing
-    assert rests.tolist() == [True] * 6 + [False] * 3 + [True, False, False] + [True] * 4
-    shows = H.motion(scene, scene).shows
-    assert np.flatnonzero(shows).tolist() == [7, 8, 11, 12]
 
 
 def test_what_is_shown_has_the_number_of_its_primitive():
@@ -388,36 +367,3 @@ def test_limits_beyond_the_bound_s_reach_are_refused(name, value):
     """HIS-6."""
     with pytest.raises(InputError, match=f"^limit `{name}` .*from 1 to {H.MOST_LIMIT}"):
         H.Limits(**{name: value})
-
-
-def test_the_corners_of_a_box_are_those_of_its_pose():
-    """HIS-2: the frame maps (1, 1, 1) to center + sum of half extents along the rows of the rotation."""
-    box = POSES["box"](0.2)
-    axes, origin = H._pose(box)
-    rows = np.array(box.rotation)
-    expected = np.array(box.center) + sum(box.half_extent[i] * rows[i] for i in range(3))
-    assert np.abs(axes @ np.ones(3) + origin - expected).max() <= 8 * U["float64"]
-
-
-def test_normals_turn_with_their_primitive_and_have_any_length():
-    """HIS-4: a box that turned by 60 degrees has the normal of 60 degrees before, and half the size: half
-    of it; a wall that grew to twice its size has a normal of half the length, which is the same side."""
-    pose = Box((0.0, 0.0, -4.0), (1.0,) * 3, WHITE, _about_y(np.radians(60.0)))
-    then = replace(pose, rotation=_about_y(0.0), half_extent=(0.5,) * 3)
-    now, before = (Scene("box", CAMERA, boxes=(box,)) for box in (pose, then))
-    own = np.array([[0.0, 0.0, 1.0]])
-    first = H.First(np.zeros(1, np.int32), own, own @ np.array(pose.rotation), own)
-    row = H.row_of(H.motion(now, before, np.float64), first.number)
-    _, normal = H.point_before(row, first)
-    assert np.abs(normal - [0.0, 0.0, 0.5]).max() <= 16 * U["float64"]
-    past, moves, first = by_hand()
-    smaller = replace(moves, turn=np.broadcast_to(-0.5 * np.eye(3), (3, 3, 3)))
-    assert H.gathered(past, smaller, first, shifted(0.0, 0.0)).count.all()
-
-
-def test_pixels_without_weight_do_not_widen_the_interval():
-    """HIS-5: at a displacement of 0 only the pixel itself counts."""
-    for color in ((0.0, 4.0, 8.0, 16.0), (16.0, 8.0, 4.0, 0.0)):
-        known = H.gathered(*by_hand(color=color), shifted(0.0, 0.0))
-        assert np.array_equal(known.low, known.color)
-        assert np.array_equal(known.high, known.color)

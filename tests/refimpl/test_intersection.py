@@ -142,9 +142,8 @@ def test_rays_parallel_to_an_axis(dtype, scale, axis, sign):
     origin = np.zeros(3)
     origin[axis] = -3.0 * sign * scale
     t, _, surface = hit(scene, origin, direction, dtype)
-    assert t == pytest.approx(
-        2.0 * scale, rel=4 * float(np.finfo(dtype).eps)
-    )  # a difference, a product, a sum
+    # A difference, a product, a sum.
+    assert t == pytest.approx(2.0 * scale, rel=4 * float(np.finfo(dtype).eps))
     assert surface.normal[0, axis] == -sign
     origin[(axis + 1) % 3] = 1.001 * scale
     assert hit(scene, origin, direction, dtype)[0] == np.dtype(dtype).type(I.MISS)
@@ -192,9 +191,8 @@ def test_room_is_there_from_inside_alone():
                 t, wall, surface = hit(scene, start * direction, direction)
                 assert t == 1.0 - start
                 assert wall == 2 * axis + (sign > 0)
-                assert surface.reflectance[0, 0] == pytest.approx(
-                    0.1 * (wall + 1), rel=2.0**-52
-                )  # one rounding
+                # One rounding.
+                assert surface.reflectance[0, 0] == pytest.approx(0.1 * (wall + 1), rel=2.0**-52)
                 assert surface.normal[0, axis] == -sign
     assert hit(scene, (3.0, 3.0, 0.0), (-1.0, 0.0, 0.0))[0] == I.MISS
 
@@ -227,16 +225,6 @@ def test_light_is_black_behind():
     )  # four roundings
     assert np.all(above.emission == 0.0)
     assert below.light[0] == above.light[0] == 0
-
-
-def test_miss_gives_the_background_and_zeros():
-    t, surface_id, surface = hit(
-        replace(scene_of(), background=(0.1, 0.2, 0.3)), (0.0, 0.0, 0.0), (1.0, 2.0, 3.0)
-    )
-    assert (t, surface_id) == (I.MISS, 0)
-    assert surface.emission[0].tolist() == [0.1, 0.2, 0.3]
-    assert np.all(surface.normal == 0.0)
-    assert np.all(surface.point == 0.0)
 
 
 # -- many primitives
@@ -273,20 +261,6 @@ def many_boxes(angles: list[float]) -> Scene:
 
 SHARING = [0.3] * 4 + [0.0, 0.5, 0.7, 0.7, 0.3, 0.9] + [1.1] * 4 + [1.3] * 3
 """Angles of boxes: two groups that share theirs, one parallel to the axes, and small groups around them."""
-
-
-def test_boxes_are_grouped_by_rotation_and_small_groups_joined():
-    geometry = I.build(many_boxes(SHARING), np.float64)
-    shape = [(len(g.centers), g.shared, g.rotated, g.first_id) for g in geometry.groups]
-    assert shape == [
-        (5, True, True, 0),
-        (1, True, False, 5),
-        (4, False, True, 6),
-        (4, True, True, 10),
-        (3, False, True, 14),
-    ]
-    assert geometry.groups[2].rotation.shape == (4, 3, 3)
-    assert np.array_equal(geometry.groups[2].rotation[1], geometry.groups[2].rotation[2])
 
 
 def test_many_boxes_are_grouped_in_one_look():
@@ -350,13 +324,6 @@ def test_boxes_on_a_turned_grid_share_their_coordinates(time):
         assert all(np.sum(centers[:, k] == 0.0) == 9 for k in range(3))
         grid = scenes.CUBE_SPACING * np.array([-1.0, 0.0, 1.0])
         assert np.abs(centers[..., np.newaxis] - grid).min(axis=-1).max() <= 2.0**-24
-
-
-def test_small_coordinates_that_are_no_noise_are_kept():
-    """A centre of 1e-12 beside ones of 1 is 4,500 times the bound of 16 units of 2**-53."""
-    scene = replace(scenes.empty(), boxes=(Box((1.0, 1e-12, -1.0), (0.1,) * 3, (0.5,) * 3),))
-    (group,) = I.build(scene, np.float64).groups
-    assert group.centers[0].tolist() == [1.0, 1e-12, -1.0]
 
 
 def test_occluded_agrees_with_closest_hit():

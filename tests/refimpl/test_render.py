@@ -8,10 +8,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from wamnet.kernels.run.render_pool import bands, render_parallel
-from wamnet.refimpl import frame, rng
+from wamnet.refimpl import frame
 from wamnet.refimpl.errors import InputError
 from wamnet.refimpl.light import render as R
-from wamnet.refimpl.light import scenes, sobol
+from wamnet.refimpl.light import scenes
 from wamnet.refimpl.light.scene import Camera, Scene, Sphere
 from wamnet.refimpl.light.transport import Settings
 
@@ -68,9 +68,8 @@ def test_samples_are_numbered_so_that_a_render_can_be_split():
     job = R.Job(8, 8, 8, dtype="float64")
     halves = [R.render(CORNELL, replace(job, spp=4, first_sample=k)).frame["color"] for k in (0, 4)]
     whole = R.render(CORNELL, job).frame["color"]
-    assert (
-        np.max(np.abs((halves[0] + halves[1]) / 2 - whole)) <= 16 * 2.0**-52 * whole.max()
-    )  # 8 sums of positives
+    # 8 sums of positives.
+    assert np.max(np.abs((halves[0] + halves[1]) / 2 - whole)) <= 16 * 2.0**-52 * whole.max()
     assert not np.array_equal(*halves)
 
 
@@ -80,10 +79,8 @@ def test_seeds_and_pixels_differ():
 
 
 def test_a_pixel_is_the_same_in_an_image_of_another_size():
-    """The random numbers of a pixel depend on x and y, not on the image's width: neighbours of other jobs
-    line up."""
-    x, y = np.array([5]), np.array([9])
-    assert R.pixel_counter(x, y)[0] == 5 + 65536 * 9
+    """The random numbers of a pixel depend on x and y, not on the width: neighbours of other jobs line up."""
+    assert R.pixel_counter(np.array([5]), np.array([9]))[0] == 5 + 65536 * 9
 
 
 def test_variance_equals_that_of_the_samples():
@@ -92,9 +89,8 @@ def test_variance_equals_that_of_the_samples():
     singles = [R.render(CORNELL, replace(job, spp=1, first_sample=k)).frame["color"] for k in range(5)]
     expected = np.var(np.stack(singles), axis=0, ddof=1)
     got = R.render(CORNELL, job).color_variance
-    assert np.max(np.abs(got - expected)) <= 1e-13 * max(
-        expected.max(), 1.0
-    )  # 30 roundings of 2**-53, with margin
+    # 30 roundings of 2**-53, with margin.
+    assert np.max(np.abs(got - expected)) <= 1e-13 * max(expected.max(), 1.0)
 
 
 def test_layers_of_a_known_scene():
@@ -113,9 +109,8 @@ def test_layers_of_a_known_scene():
     assert np.max(np.abs(result["direction"][y, x] - [0.0, 0.0, -1.0])) <= reach / 4
     ray_end = np.array([0.0, 0.0, 4.0]) + result["direction"] * result["depth"]
     hit = result["depth"][..., 0] > 0
-    assert (
-        np.max(np.abs(ray_end - result["position"])[hit]) <= 16 * 2.0**-52 * 8
-    )  # a product and a sum of numbers < 8
+    # A product and a sum of numbers < 8.
+    assert np.max(np.abs(ray_end - result["position"])[hit]) <= 16 * 2.0**-52 * 8
 
 
 def test_features_of_more_rays_are_their_means():
@@ -151,49 +146,6 @@ def test_features_of_their_own_rays_begin_with_the_colour_s_ray(sampler):
     assert found.frame.info == {**R.render(CORNELL, replace(job, feature_spp=0)).frame.info, **facts}
 
 
-def test_four_rays_cover_the_quarters_of_their_pixel():
-    """RND-2c: each quarter has one ray, and so has each column and row of a quarter's width."""
-    y, x = np.divmod(np.arange(64 * 64), 64)
-    u, v = np.stack(
-        [
-            sobol.net_uniforms(
-                rng.counter(3), R.pixel_counter(x, y), rng.counter(n), np.uint32(0), np.float64
-            )[:2]
-            for n in range(4)
-        ],
-        axis=1,
-    )
-    for cells in (2 * np.floor(2 * u) + np.floor(2 * v), np.floor(4 * u), np.floor(4 * v)):
-        assert np.array_equal(np.sort(cells, axis=0), np.tile(np.arange(4.0)[:, None], len(x)))
-    # The first one is the path's: pcg4d's sample 0.
-    first = rng.uniforms(rng.counter(3), R.pixel_counter(x, y), rng.counter(0), np.uint32(0), np.float64)
-    assert np.array_equal((u[0], v[0]), first[:2])
-
-
-def test_four_rays_that_are_spread_are_worth_eight_at_random():
-    """RND-2c: on the mini cubes, by the mean squares of errors against 256 rays.
-
-    A straight edge crosses about sqrt(N) of N cells of a pixel, and only these err: a mean over N rays, one
-    in each, has a variance of order N^-3/2, as N^3/2 random rays have, 8 for 4. The 256 rays themselves err
-    by 64^3/2 = 512 times less than 4. Eight seeds of 64 x 64 pixels, of which a tenth are at edges,
-    know mean squares to about 1 / sqrt(3276), 2 %, times the few units of their kurtosis.
-    """
-    scene = scenes.canonical("minicubes", time=1.1)
-
-    def rendered(sampler: str, rays: int, seed: int):
-        settings = Settings(max_depth=0, sampler=sampler)
-        return R.render(scene, R.Job(64, 64, rays, seed, settings)).frame
-
-    best, ways = rendered("sobol", 256, 9), (("net", 4), ("pcg4d", 8))
-    frames = {sampler: [rendered(sampler, rays, s) for s in range(8)] for sampler, rays in ways}
-    for layer in ("albedo", "normal"):
-        squares = {
-            sampler: np.mean([(each[layer] - best[layer]) ** 2 for each in some])
-            for sampler, some in frames.items()
-        }
-        assert squares["net"] <= squares["pcg4d"]
-
-
 @pytest.mark.parametrize("feature_spp", [0, 1, 2])
 def test_features_of_no_more_rays_are_the_colour_s(feature_spp):
     job = R.Job(5, 4, 2, seed=5)
@@ -201,19 +153,6 @@ def test_features_of_no_more_rays_are_the_colour_s(feature_spp):
     assert equal(found, R.render(CORNELL, job))
     assert "feature_spp" not in found.frame.info
     assert replace(job, feature_spp=feature_spp).samples == 5 * 4 * 2
-
-
-@pytest.mark.parametrize("dtype", ["float32", "float64"])
-@pytest.mark.parametrize("name", ["cornell", "lone_light", "empty"])
-def test_layers_are_zero_where_nothing_is_hit(name, dtype):
-    """Each of these scenes has rays that miss; single samples, so that a miss is a pixel of zeros."""
-    result = R.render(scenes.canonical(name), R.Job(33, 33, dtype=dtype)).frame
-    missed = result["depth"][..., 0] == 0.0
-    assert missed.any()
-    assert result["depth"].max() < 200.0
-    for layer in ("albedo", "normal", "position"):
-        assert not result[layer][missed].any()
-        assert result[layer][~missed].any() or name == "empty"
 
 
 def test_row_zero_is_the_top_and_column_zero_the_left():

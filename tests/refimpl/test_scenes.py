@@ -45,15 +45,8 @@ def test_minicubes_turn_inside_their_room(time):
     assert reach < 2.0
     first, last = scene.boxes[0].center, scene.boxes[-1].center
     distance = sum((a - b) ** 2 for a, b in zip(first, last, strict=True)) ** 0.5
-    assert distance == pytest.approx(
-        2 * scenes.CUBE_SPACING * 3**0.5, rel=1e-12
-    )  # a rotation in float64: some ulps
-
-
-def test_minicubes_come_back_after_a_turn_and_differ_in_between():
-    start, half, turn = (scenes.minicubes(time=t).boxes[0].center for t in (0.0, 4.0, scenes.TURN_SECONDS))
-    assert start == pytest.approx(turn, abs=1e-14)  # cos and sin of 2 pi: some ulps of 1
-    assert max(abs(a - b) for a, b in zip(start, half, strict=True)) > 0.5
+    # A rotation in float64: some ulps.
+    assert distance == pytest.approx(2 * scenes.CUBE_SPACING * 3**0.5, rel=1e-12)
 
 
 @pytest.mark.parametrize("time", [0.0, 0.9, 2.1, 5.0])
@@ -104,16 +97,6 @@ def test_vitrine_s_materials_move_apart():
     along, across = later.quads[0].edge_u, later.spheres[1].center
     assert along[0] * across[0] + along[2] * across[2] == pytest.approx(0.0, abs=1e-12)
     assert start.quads[0].edge_u != later.quads[0].edge_u
-
-
-def test_glossy_has_every_material_and_its_parameters():
-    scene = scenes.canonical("glossy", roughness=0.5, ior=1.7)
-    materials = [part.material for part in (*scene.boxes, *scene.spheres, *scene.quads)]
-    assert {m.kind for m in materials if m} == {"conductor", "dielectric", "mirror"}
-    assert {m.ior for m in materials if isinstance(m, Dielectric)} == {1.7}
-    assert 0.5 in {m.roughness for m in materials if isinstance(m, Conductor)}
-    with pytest.raises(InputError, match=r"scene.boxes\[2\].material.ior 5: an index of refraction"):
-        scenes.canonical("glossy", ior=5)
 
 
 @pytest.mark.parametrize("name", scenes.CANONICAL)

@@ -1,4 +1,4 @@
-"""Adam: hand-worked first steps, PyTorch's numbers, and gradients that are zero, tiny and huge."""
+"""Adam: PyTorch's numbers, gradients that are huge, and what a step leaves as it is."""
 
 from typing import Any
 

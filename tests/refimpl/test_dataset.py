@@ -123,26 +123,6 @@ def test_no_frame_leaves_the_ranges(scale: float) -> None:
         assert image.max() <= feature.high
 
 
-def test_feature_ranges_channels_and_order() -> None:
-    frame = frame_of(5, 4)
-    scales = Normalization(depth_scale=1.5, position_scale=1.5)
-    image = dataset.feature_image(frame, tuple(FEATURES), scales)
-    assert image.dtype == np.float32
-    assert image.shape == (5, 4, dataset.channels_of(tuple(FEATURES))) == (5, 4, 54)
-    first = 0
-    for feature in FEATURES.values():
-        assert feature.channels == LAYERS[feature.layer].channels
-        part = image[..., first : first + feature.channels]
-        assert np.array_equal(part, dataset.feature_image(frame, (feature.name,), scales))
-        assert part.min() >= feature.low
-        assert part.max() <= feature.high
-        # Layers reach beyond the range, so the clip is seen; the interior is seen too. White is far below
-        # what `highlights` clips, and a mean of 25 pixels is inside.
-        assert (part == feature.high).any() or feature.name == "highlights" or feature.guides
-        assert ((part > feature.low) & (part < feature.high)).any()
-        first += feature.channels
-
-
 def test_features_by_hand() -> None:
     """One pixel, numbers that float32 holds exactly, so that every result is exact."""
     one = np.ones((1, 1, 1))
@@ -196,13 +176,6 @@ def test_sums_stay_in_the_range_that_a_feature_promises() -> None:
         assert values.max() <= FEATURES[name].high
 
 
-def test_features_do_not_depend_on_the_frames_float_type() -> None:
-    narrow = frame_of(3, 3)
-    wide = Frame({name: values.astype(np.float64) for name, values in narrow.layers.items()})
-    images = [dataset.feature_image(frame, tuple(FEATURES), Normalization()) for frame in (narrow, wide)]
-    assert np.array_equal(*images)
-
-
 def test_missing_layer_is_named() -> None:
     frame = Frame({"color": np.zeros((2, 2, 3))})
     message = "layers of the frame 'color': layer 'normal' is missing (render it"
@@ -245,12 +218,6 @@ def test_a_plain_to_the_horizon_does_not_press_the_rest_together() -> None:
     encoded = dataset.encode_position(position, found)
     assert encoded[0, 0, 0] == 1.0  # what is beyond is clipped
     assert encoded[0, 1, 0] == -1.0
-
-
-def test_normalization_without_layers_or_hits_divides_by_one() -> None:
-    assert dataset.normalization_of([Frame({"color": np.zeros((1, 1, 3))})]) == Normalization()
-    blind = Frame({"depth": np.zeros((2, 2, 1)), "position": np.zeros((2, 2, 3))})
-    assert dataset.normalization_of([blind]) == Normalization()
 
 
 @pytest.mark.parametrize(
@@ -315,30 +282,6 @@ def test_samples_lie_in_their_frames_and_are_uniform() -> None:
     first = np.array([0, 12, 21])
     counts = np.bincount(first[frame] + y * widths[frame] + x, minlength=46)
     assert np.sum((counts - 1000.0) ** 2 / 1000.0) <= 113.2
-
-
-def test_samples_are_functions_of_seed_and_stream() -> None:
-    draws = [
-        np.stack(dataset.sample_pixels(seed, stream, 50, [(100, 100)])).tolist()
-        for seed, stream in ((1, 1), (1, 1), (1, 2), (2, 1))
-    ]
-    assert draws[0] == draws[1]
-    assert draws[0] != draws[2]
-    assert draws[0] != draws[3]
-
-
-def test_a_longer_draw_begins_with_the_shorter_one() -> None:
-    long, short = (dataset.sample_indices(3, 4, 5, count, 1000) for count in (11, 6))
-    assert long[:6].tolist() == short.tolist()
-
-
-def test_index_is_the_scaled_word() -> None:
-    """n = 1 always gives 0; the largest words give n - 1, never n, up to the largest n."""
-    assert dataset.sample_indices(0, 0, 0, 9, 1).tolist() == [0] * 9
-    top = dataset.sample_indices(0, 0, 0, 4096, 2**31 - 1)
-    assert 0 <= top.min() <= top.max() < 2**31 - 1
-    # 4096 uniform draws all miss the upper 1 % with probability 0.99**4096 < 1e-17.
-    assert top.max() >= 0.99 * 2**31
 
 
 @pytest.mark.parametrize("missed", [1e9, 1e10, np.finfo(np.float32).max, np.inf, np.nan])

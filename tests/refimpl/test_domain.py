@@ -42,23 +42,6 @@ def test_a_step_has_its_description() -> None:
     assert np.abs(domain.describe(board) - [[0.5], [0.0], [1.0]]).max() <= 40 * ULP
 
 
-def test_a_pixel_has_no_neighbours() -> None:
-    assert domain.describe(np.full((1, 1, 2), 0.25)).tolist() == [[0.25, 0.25], [0.0, 0.0], [0.0, 0.0]]
-    assert domain.describe(np.array([[[0.0], [1.0]]]))[2, 0] == 1.0
-
-
-def test_noise_does_not_spread() -> None:
-    """Independent noise leaves the spread of what is shown; with it the deviation would be 0.58.
-
-    Of N = 10,000 pixels the variance of noise 0.5^2 is known to about sqrt(2/N) of itself, and so is r^2/2:
-    together they are off by at most 6 * 2 * 0.25 * 0.0142 = 0.043, which is 0.07 of the spread 0.29.
-    """
-    ramp = np.linspace(0.0, 1.0, 100)[None, :, None] * np.ones((100, 1, 1))
-    clean = domain.describe(ramp)[1, 0]
-    noisy = domain.describe(ramp + np.random.default_rng(1).normal(0.0, 0.5, ramp.shape))[1, 0]
-    assert abs(noisy**2 - clean**2) <= 0.043
-
-
 def test_the_distance_by_another_way() -> None:
     """Written with loops: each number against mean and deviation, roughness upwards only; its name comes."""
     learned, shown = images(12), images(1, seed=5)[0] * 3.0
@@ -80,26 +63,6 @@ def test_the_distance_by_another_way() -> None:
     assert (measured.statistic, measured.channel) == best[1:]
     assert measured.is_outside
     assert found.frames == 12
-
-
-def test_smoother_is_inside() -> None:
-    """The same levels without noise are off by nothing in roughness; with three times the noise they are."""
-    learned = images(12)
-    found = domain.domain_of(learned, ("color", "depth"))
-    level = learned[0].mean(axis=(0, 1))
-    assert not domain.measure(found, np.broadcast_to(level, (12, 12, 4))).is_outside
-    noise = 0.06 * np.random.default_rng(2).normal(size=(12, 12, 4))
-    rough = domain.measure(found, level + noise)
-    assert (rough.statistic, rough.is_outside) == ("roughness", True)
-
-
-@pytest.mark.parametrize(
-    ("count", "place", "rate"), [(9, 9, 1 / 10), (18, 18, 1 / 19), (19, 19, 1 / 20), (39, 38, 2 / 40)]
-)
-def test_the_threshold_is_a_rank(count, place, rate) -> None:
-    """Of the numbers 1 to n, in any order, the threshold is its own place."""
-    order = np.random.default_rng(count).permutation(np.arange(1.0, count + 1.0))
-    assert domain.threshold_of(order.tolist()) == (float(place), rate)
 
 
 def test_frames_of_the_same_kind_are_seldom_outside() -> None:

@@ -8,7 +8,7 @@ import pytest
 from wamnet.refimpl.errors import InputError
 from wamnet.refimpl.light.render import Job, render
 from wamnet.refimpl.light.scenes import canonical
-from wamnet.refimpl.network import dataset, factored, siren, train
+from wamnet.refimpl.network import dataset, factored, train
 from wamnet.refimpl.network.dataset import Normalization
 from wamnet.refimpl.network.denoise import Model, check_model
 from wamnet.refimpl.network.factored import Factors
@@ -158,24 +158,6 @@ def test_resuming_gives_the_same_bits(pairs) -> None:
     rest = train.train(RECIPE, pairs, state=again)
     for one, two in zip(whole.parameters, rest.parameters, strict=True):
         assert (one == two).all()
-
-
-def test_a_trained_network_is_cut_and_gone_on_with(pairs) -> None:
-    """The first state is the cut network; a state of other shapes is refused."""
-    full = train.train(replace(RECIPE, rank=0), pairs)
-    begin = train.train(RECIPE, pairs, network=full.siren, until=0)
-    assert (begin.siren.weights[0] == factored.expand(factored.cut(full.siren.weights[0], 6, 3))).all()
-    assert all((a == b).all() for a, b in zip(begin.siren.weights[1:], full.siren.weights[1:], strict=True))
-    assert train.train(replace(RECIPE, rank=0), pairs, network=full.siren, until=0).siren is full.siren
-    other = siren.init((6 * 6 * 6, 9, 8, 3), 1.0, 10.0, 1)
-    with pytest.raises(
-        InputError, match=r"widths, omegas and activation of the first network \(\(216, 9, 8, 3\)"
-    ):
-        train.train(RECIPE, pairs, network=other)
-    arrays, text = train.state_to_arrays(begin)
-    arrays["layer0.vertical"] = arrays["layer0.vertical"][:, :, :2]
-    with pytest.raises(InputError, match=r"parameter 0 'float32 \(8, 6, 2\)': must be of shape"):
-        train.check_state(train.state_from_arrays(arrays, text))
 
 
 def test_refusals() -> None:

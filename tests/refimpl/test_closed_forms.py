@@ -63,9 +63,8 @@ def test_sphere_in_a_white_sky():
     hit = result.frame["depth"][..., 0] > 0.0
     assert 100 < hit.sum() < 33 * 33 - 100
     expected = np.where(hit[..., None], np.array(sphere.reflectance), 1.0)
-    assert (
-        np.max(np.abs(result.frame["color"] - expected)) <= 8 * np.finfo(np.float64).eps
-    )  # two products, two sums
+    # Two products, two sums.
+    assert np.max(np.abs(result.frame["color"] - expected)) <= 8 * np.finfo(np.float64).eps
 
 
 def test_empty_scene_shows_its_background():

@@ -35,14 +35,6 @@ def test_round_trip(dtype: type) -> None:
     assert np.abs(back - x).max() <= 16 * 12.92 * np.finfo(dtype).eps
 
 
-def test_joint_is_nearly_continuous() -> None:
-    """The standard rounds its constants: the jump at the joint is far below half an 8-bit level (1 / 510)."""
-    low, high = encoding.srgb_encode(
-        np.array([encoding.LINEAR_LIMIT, np.nextafter(encoding.LINEAR_LIMIT, 1.0)])
-    )
-    assert abs(high - low) <= 1e-7  # 1.055 * 0.0031308**(1 / 2.4) - 0.055 - 12.92 * 0.0031308 = 2.8e-8
-
-
 def test_monotone_and_in_range() -> None:
     """A brighter value never becomes a darker one, on the display and in 8 bits."""
     x = np.concatenate([np.linspace(0.0, 0.01, 10001), np.linspace(0.01, 4.0, 10001)])
@@ -62,13 +54,6 @@ def test_exposure_is_undone(stops: float, share: float) -> None:
     assert abs(back[0] - linear[0]) <= 1e-8 * 2.0**-stops
 
 
-def test_one_stop_doubles() -> None:
-    """Powers of two are exact, so the scaling is."""
-    x = np.array([0.125, 3.0], np.float32)
-    assert (encoding.expose(x, 1.0) == 2 * x).all()
-    assert encoding.expose(x, 1.0).dtype == np.float32
-
-
 def test_8bit_rounds_halves_up_and_clips() -> None:
     """Level k stands for k / 255; halves go up; outside [0, 1] is clipped."""
     halves = (np.arange(255) + 0.5) / 255.0
@@ -85,13 +70,6 @@ def test_8bit_levels_come_back() -> None:
     levels = np.arange(256, dtype=np.uint8)
     assert (encoding.to_8bit(encoding.from_8bit(levels)) == levels).all()
     assert encoding.from_8bit(levels)[-1] == 1.0
-
-
-def test_negative_values_follow_the_line() -> None:
-    """A negative value is not a NaN."""
-    x = np.array([-0.5, -1e-3])
-    assert (encoding.srgb_encode(x) == 12.92 * x).all()
-    assert (encoding.srgb_decode(x) == x / 12.92).all()
 
 
 def test_normals_for_viewing() -> None:

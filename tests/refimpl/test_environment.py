@@ -139,16 +139,6 @@ def test_white_furnace(strategy):
     assert_all_plausible(z_p(mean - 0.5, np.maximum(error, 2.0**-39)))
 
 
-def test_camera_sees_the_sky_itself():
-    """Where nothing is hit a pixel has the sky's radiance, in every strategy: to the bit, one sample each."""
-    scene = Scene("sky", Camera((0.0, 0.0, 0.0), (0.0, 0.1, -1.0), vertical_fov_deg=90.0), environment=SKY)
-    for strategy in transport.STRATEGIES:
-        frame = R.render(scene, R.Job(9, 9, 1, 1, Settings(strategy=strategy))).frame
-        expected = environment.radiance(built(SKY, np.float32), frame["direction"])
-        assert np.array_equal(frame["color"], expected)
-        assert np.all(frame["albedo"] == 0.0)
-
-
 @pytest.mark.parametrize("lit", [False, True])
 def test_strategies_agree(lit):
     """With and without a lamp (ENV-4): all ways to find light estimate the same image."""
@@ -181,10 +171,3 @@ def test_the_sun_of_the_layer_is_the_one_that_lights():
     others = np.random.default_rng(0).standard_normal((1000, 3))
     others /= np.linalg.norm(others, axis=1, keepdims=True)
     assert environment.radiance(built, sun)[0] > environment.radiance(built, others)[:, 0].max()
-
-
-def test_daylight_has_a_sky_and_no_lamp():
-    scene = scenes.canonical("daylight", time=1.0)
-    assert scene.environment is not None
-    assert not scene.lights
-    assert scene.environment != scenes.canonical("daylight", time=3.0).environment

@@ -102,9 +102,3 @@ def test_a_choice_suggests_a_similar_name_and_lists_all():
         "did you mean 'minicubes'? choose one of glossy, minicubes"
     )
     assert choice("attic", {"glossy": 1, "minicubes": 2}) == "choose one of glossy, minicubes"
-
-
-def test_escapes_are_those_of_python():
-    assert escaped("a\x1b[2J\u202e\ud800\U000e0041 \u00e4\u4e16") == (
-        "a\\x1b[2J\\u202e\\ud800\\U000e0041 \u00e4\u4e16"
-    )

@@ -94,11 +94,3 @@ def test_pixels_that_are_not_finite_are_counted(value: float) -> None:
         InputError, match=rf"layer 'normal' at x=1, y=2 \(first of 2 such pixels\) {value}: every"
     ):
         validate(frame)
-
-
-def test_one_bad_pixel_is_told_in_the_singular() -> None:
-    """One pixel, no plural."""
-    frame = full_frame(1, 1)
-    frame.layers["depth"][0, 0, 0] = np.nan
-    with pytest.raises(InputError, match=r"layer 'depth' at x=0, y=0 \(first of 1 such pixel\) nan"):
-        validate(frame)

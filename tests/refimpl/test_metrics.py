@@ -1,4 +1,4 @@
-"""Tests of the metrics: worked examples, scikit-image as oracle, symmetry, edge cases, refusals."""
+"""Tests of the metrics: worked examples, scikit-image as oracle, edge cases, refusals."""
 
 import math
 from collections.abc import Callable
@@ -6,9 +6,6 @@ from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
-from hypothesis.extra import numpy as arrays
 
 from wamnet.refimpl import metrics
 from wamnet.refimpl.errors import InputError
@@ -119,30 +116,6 @@ def test_identical_images(value: float | None) -> None:
     assert metrics.ssim(a, a) == 1.0
     assert metrics.relmse(a, a) == 0.0
     assert metrics.smape(a, a) == 0.0
-
-
-IMAGES = arrays.arrays(np.float64, (11, 12, 1), elements=st.floats(0.0, 1.0))
-
-
-@given(IMAGES, IMAGES)
-def test_symmetry_and_ranges(a: np.ndarray, b: np.ndarray) -> None:
-    """All but relMSE (whose reference is special) are symmetric to the bit; ranges hold."""
-    for metric in (metrics.mse, metrics.psnr, metrics.ssim, metrics.smape):
-        assert metric(a, b) == metric(b, a)
-    assert 0.0 <= metrics.mse(a, b) <= 1.0
-    assert metrics.psnr(a, b) >= 0.0
-    # Up to the rounding of the variances, 3 * 24 u over c2 = 9e-4, in both terms.
-    assert abs(metrics.ssim(a, b)) <= 1.0 + 4 * 3 * 24 * U64 / 9e-4
-    assert metrics.relmse(a, b) >= 0.0
-    assert 0.0 <= metrics.smape(a, b) < 1.0
-
-
-@given(IMAGES, st.floats(0.25, 1.0))
-def test_a_larger_error_is_a_worse_score(a: np.ndarray, step: float) -> None:
-    """Moving every pixel away from the reference by one common step worsens every error."""
-    for metric in (metrics.mse, metrics.relmse, metrics.smape):
-        assert metric(a + 2 * step, a) > metric(a + step, a) > metric(a, a)
-    assert metrics.psnr(a + 2 * step, a) < metrics.psnr(a + step, a)
 
 
 def test_largest_error_and_error_map_by_hand() -> None:

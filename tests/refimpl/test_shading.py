@@ -9,7 +9,7 @@ from vertices import uniforms
 
 from wamnet.refimpl import rng
 from wamnet.refimpl.light import render as R
-from wamnet.refimpl.light import scenes, shading, transport
+from wamnet.refimpl.light import shading, transport
 from wamnet.refimpl.light.camera import camera_basis
 from wamnet.refimpl.light.materials import MATERIALS, Conductor, Dielectric, Lambertian, Mirror
 from wamnet.refimpl.light.scene import Box, Camera, Light, Quad, Room, Scene, Sphere
@@ -106,46 +106,6 @@ def test_every_surface_has_its_own_material():
             assert np.array_equal(density[lanes], material.pdf(own, wi[lanes], cosine[lanes]))
             seen |= {material.kind} if len(lanes) else set()
         assert seen == set(MATERIALS)
-
-
-def kinds(scene):
-    return [kind.kind for kind in shading.build(scene, np.float32).kinds]
-
-
-def test_only_kinds_that_surfaces_have():
-    """Lights reflect nothing, so they ask for no material."""
-    ball = Sphere((0.0, 0.0, 0.0), 1.0, GREY, material=Mirror())
-    scene = Scene("ball", Camera((0.0, 0.0, 4.0), (0.0, 0.0, 0.0)), spheres=(ball,), lights=(LIGHT,))
-    assert kinds(scene) == ["mirror"]
-    assert kinds(replace(scene, spheres=())) == ["lambertian"]
-    assert kinds(scenes.canonical("minicubes")) == ["lambertian"]
-    assert kinds(scenes.canonical("glossy")) == ["lambertian", "conductor", "dielectric", "mirror"]
-    built = shading.build(replace(scene, spheres=(replace(ball, material=Conductor(0.3)),) * 3), np.float32)
-    assert np.array_equal(built.parameters[0], np.full(5, 0.3, np.float32))
-    assert built.centers is None
-
-
-def test_lights_are_sampled_where_they_can_be_met():
-    ball = Sphere((0.0, 0.0, 0.0), 1.0, GREY, material=Mirror())
-    scene = Scene("ball", Camera((0.0, 0.0, 4.0), (0.0, 0.0, 0.0)), spheres=(ball,), lights=(LIGHT,))
-    assert not transport.build(scene, Settings()).samples_lights
-    rough = replace(scene, spheres=(replace(ball, material=Conductor()),))
-    assert transport.build(rough, Settings()).samples_lights
-    assert not transport.build(rough, Settings(strategy="bsdf")).samples_lights
-
-
-@pytest.mark.parametrize("inside", [False, True])
-@pytest.mark.parametrize("body", [ALL.boxes[0], replace(ALL.boxes[1], material=Dielectric()), ALL.spheres[0]])
-def test_inside_and_outside(body, inside):
-    """A camera in a body's centre meets its surface from inside, one beside it from outside."""
-    x, y, z = body.center
-    camera = Camera((x, y, z) if inside else (x, y, z + 1.5), (x, y, z - 1.0), vertical_fov_deg=30.0)
-    parts = {"spheres" if isinstance(body, Sphere) else "boxes": (body,)}
-    ((world, path, surface, hit),) = arrived(Scene("one", camera, **parts))
-    at = shading.site(world.materials, surface, hit, path.direction, path.beta)
-    met = hit.surface == 0
-    assert met.sum() > 50
-    assert np.all(at.outside[met] != inside)
 
 
 def test_paths_that_pass_go_on_behind_the_surface():

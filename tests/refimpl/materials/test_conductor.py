@@ -1,4 +1,4 @@
-"""GGX: its sampling against its density, its density against its value, reciprocity, energy, hard cases."""
+"""GGX: its sampling against its density, its density against its value, energy, hard cases."""
 
 from itertools import product
 

@@ -8,9 +8,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from statistical import SIGNIFICANCE, z_p
-from vertices import NORMAL, local, local_direction, site, uniforms
+from vertices import local, local_direction, site, uniforms
 
-from wamnet.refimpl import vectors
 from wamnet.refimpl.errors import InputError
 from wamnet.refimpl.light import render as R
 from wamnet.refimpl.light.materials import Dielectric
@@ -233,7 +232,3 @@ def test_refuses_an_index(ior):
         InputError, match=r"a.ior .*: an index of refraction must lie in \[1, 4\] \(glass has 1.5"
     ):
         Dielectric(ior).check("a")
-
-
-def test_normal_is_a_unit_vector():
-    assert vectors.dot(NORMAL, NORMAL) == pytest.approx(1.0, abs=4 * EPS)

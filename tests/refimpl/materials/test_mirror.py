@@ -15,18 +15,6 @@ from wamnet.refimpl.light.transport import STRATEGIES, Settings
 EPS = 2.0**-52
 
 
-@given(st.floats(0.0, 1.0), st.floats(-np.pi, np.pi))
-def test_angle_out_is_angle_in(cosine, phi):
-    """x and y change their sign, z stays: a dozen roundings, and those of two turns."""
-    wo = local_direction(np.array([cosine]), phi)
-    at = site(wo, Mirror(), (0.9, 0.5, 0.0))
-    direction, beta, pdf, through = Mirror.sample(at, *np.zeros((3, 1)))
-    assert np.max(np.abs(local(direction) - wo * [-1, -1, 1])) <= 32 * EPS
-    assert np.array_equal(beta, at.tinted)
-    assert pdf[0] == SINGLE_PDF
-    assert through is None
-
-
 @pytest.mark.parametrize("dtype", ["float32", "float64"])
 def test_mirror_ball_in_a_white_sky_is_its_reflectance(dtype):
     ball = Sphere((0.0, 0.0, 0.0), 1.0, (0.75, 0.5, 1.0), material=Mirror())
@@ -56,3 +44,15 @@ def test_light_in_a_mirror_has_its_full_radiance(strategy):
     ]
     # Radiance 36 pi / (pi 36) = 1, to some roundings.
     assert np.max(np.abs(color - [0.5, 0.25, 1.0])) <= 16 * EPS
+
+
+@given(st.floats(0.0, 1.0), st.floats(-np.pi, np.pi))
+def test_angle_out_is_angle_in(cosine, phi):
+    """x and y change their sign, z stays: a dozen roundings, and those of two turns."""
+    wo = local_direction(np.array([cosine]), phi)
+    at = site(wo, Mirror(), (0.9, 0.5, 0.0))
+    direction, beta, pdf, through = Mirror.sample(at, *np.zeros((3, 1)))
+    assert np.max(np.abs(local(direction) - wo * [-1, -1, 1])) <= 32 * EPS
+    assert np.array_equal(beta, at.tinted)
+    assert pdf[0] == SINGLE_PDF
+    assert through is None

@@ -24,6 +24,7 @@ import wamnet
 from wamnet.cli.files.outputs import replacing
 from wamnet.refimpl.encoding import to_8bit, to_display
 from wamnet.refimpl.frame import Frame
+from wamnet.refimpl.light.scenes import TURN_SECONDS
 from wamnet.refimpl.light.variation import Variation
 from wamnet_peers.peer_oidn import Kept
 
@@ -37,6 +38,9 @@ RAYS = 16
 """Camera rays per pixel of the features, which send a shadow ray each; paths of Open Image Denoise's direct
 light."""
 
+CACHE = Path("out/lab/frames")
+"""Folder of the frames."""
+
 QUALITY = 62
 """Quality of the WebP file, which decides its size."""
 
@@ -44,12 +48,12 @@ LABELS = ("1 path per pixel", "wamnet", "Open Image Denoise", f"reference, {REFE
 """What is above each panel."""
 
 
-def shots(period: float) -> Iterator[Shot]:
+def shots() -> Iterator[Shot]:
     """Yield the noisy frames of the loop: each its own time and camera."""
     for step in range(FRAMES):
         phase = step / FRAMES
         look = Variation(yaw_deg=YAW_DEG * math.sin(2 * math.pi * phase))
-        yield noisy(Shot("minicubes", period * phase, SIZE, 1, step, RAYS, look, shadow_rays=1))
+        yield noisy(Shot("minicubes", TURN_SECONDS * phase, SIZE, 1, step, RAYS, look, shadow_rays=1))
 
 
 def panels(rendered: Sequence[Frame], model: wamnet.Model, other: Kept) -> list[NDArray[np.uint8]]:
@@ -78,14 +82,12 @@ def main() -> None:
     """Render and write the loop."""
     parser = described(__doc__)
     parser.add_argument("-o", "--output", type=Path, default=Path("docs/images/front.webp"))
-    parser.add_argument("--cache", type=Path, default=Path("out/lab/frames"), help="folder of the frames")
-    parser.add_argument("--period", type=float, default=8.0, help="the scene's time at the loop's end")
     options = parser.parse_args()
     model, other = wamnet.load("minicubes"), Kept((SIZE, SIZE), clean=True)
-    loop = list(shots(options.period))
+    loop = list(shots())
     kinds = (loop, *zip(*(one_scattering(shot, RAYS) for shot in loop), strict=True))
     kinds = (*kinds, [reference(shot, REFERENCE_SPP) for shot in loop])
-    rendered = [frames(options.cache, kind) for kind in kinds]
+    rendered = [frames(CACHE, kind) for kind in kinds]
     pages = [sheet(panels(each, model, other)) for each in zip(*rendered, strict=True)]
     with replacing(options.output) as path:
         pages[0].save(

@@ -6,9 +6,9 @@
     python experiments/mutants.py -o out/mutants --c99 --count 600
 
 Words choose mutants whose name holds one, or whose change, which has a function in place of the line;
-`--count` draws some by a seed. Outcomes are kept in the folder, and a mutant that has one is not asked again;
-with `--survivors` those that were not caught are. It prints tables of mutants by module and by sort, then
-every survivor without a reason in records/survivors.txt.
+`--count` draws some by a seed. Outcomes are kept in the folder, and a mutant that has one is not asked again.
+It prints tables of mutants by module and by sort, then every survivor without a reason in
+records/survivors.txt.
 """
 
 import argparse
@@ -30,8 +30,6 @@ from lab.command import described
 from lab.mutation import Mutant
 from lab.tables import markdown
 from lab.trial import Outcome
-
-from wamnet.spec.conformance import vectors
 
 REASONS = trial.ROOT / "experiments/records/survivors.txt"
 """Survivors that no vector can tell from the reference: `change | number | sort | words` ([`Reason`])."""
@@ -65,16 +63,16 @@ def chosen(words: Sequence[str], count: int | None, seed: int, c99: bool = False
     return found[:count]
 
 
-def of_reference(some: Sequence[Mutant], folder: Path) -> Iterator[Outcome | None]:
-    """Yield what comes of mutants of the reference, asked the vectors of a folder."""
-    cases, sources = trial.in_order(folder), texts(c99=False)
+def of_reference(some: Sequence[Mutant]) -> Iterator[Outcome | None]:
+    """Yield what comes of mutants of the reference."""
+    cases, sources = trial.in_order(), texts(c99=False)
     reached = trial.reach(cases)
     yield from (trial.trial(mutant, sources[mutant.module], cases, reached) for mutant in some)
 
 
-def of_c99(some: Sequence[Mutant], folder: Path) -> Iterator[Outcome | None]:
-    """Yield what comes of mutants of the C program, asked the vectors of a folder."""
-    cases, (source,) = trial.in_order(folder), texts(c99=True).values()
+def of_c99(some: Sequence[Mutant]) -> Iterator[Outcome | None]:
+    """Yield what comes of mutants of the C program."""
+    cases, (source,) = trial.in_order(), texts(c99=True).values()
     with tempfile.TemporaryDirectory() as place:
         lines = trial_c.reach(source, cases, Path(place))
         yield from (trial_c.trial(mutant, source, cases, lines, Path(place)) for mutant in some)
@@ -82,14 +80,11 @@ def of_c99(some: Sequence[Mutant], folder: Path) -> Iterator[Outcome | None]:
 
 def asked(some: Sequence[Mutant], kept: dict[str, Outcome], path: Path, options: argparse.Namespace) -> None:
     """Ask mutants that have no outcome yet, and add theirs to the file."""
-    again = options.survivors
-    waiting = [
-        m for m in some if m.name not in kept or (again and kept[m.name].asked and not kept[m.name].verdict)
-    ]
+    waiting = [m for m in some if m.name not in kept]
     if not waiting:
         return
     began = time.monotonic()
-    outcomes = (of_c99 if options.c99 else of_reference)(waiting, options.vectors)
+    outcomes = (of_c99 if options.c99 else of_reference)(waiting)
     with path.open("a", encoding="utf-8") as file:
         for number, (mutant, outcome) in enumerate(zip(waiting, outcomes, strict=True)):
             # What does not compile counts as not reached.
@@ -102,7 +97,7 @@ def asked(some: Sequence[Mutant], kept: dict[str, Outcome], path: Path, options:
 
 
 def read(path: Path) -> dict[str, Outcome]:
-    """Return the outcomes in a file; of several of one mutant the last."""
+    """Return the outcomes in a file."""
     if not path.exists():
         return {}
     rows = (json.loads(line) for line in path.read_text(encoding="utf-8").splitlines())
@@ -203,10 +198,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser.add_argument("-o", "--output", type=Path, required=True, help="folder of outcomes")
     parser.add_argument("--count", type=int, help="how many, drawn at random; all without it")
     parser.add_argument("--seed", type=int, default=0, help="seed of the draw")
-    parser.add_argument("--vectors", type=Path, default=vectors.FOLDER, help="folder of vectors")
     parser.add_argument("--c99", action="store_true", help="change the C program, not the reference")
-    parser.add_argument("--most-missed", type=float, default=MOST_MISSED, help="share that may be missed")
-    parser.add_argument("--survivors", action="store_true", help="ask again those that were not caught")
     options = parser.parse_args(arguments)
     options.output.mkdir(parents=True, exist_ok=True)
     path = options.output / ("c99.jsonl" if options.c99 else "reference.jsonl")
@@ -219,7 +211,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     fair = [m for m in some if kept[m.name].asked and not excuse(m, known)]
     left = [m for m in fair if not kept[m.name].verdict]
     print("\n".join(f"missed: {m.change} (line {m.line})" for m in left))
-    return 1 if len(left) > options.most_missed * len(fair) else 0
+    return 1 if len(left) > MOST_MISSED * len(fair) else 0
 
 
 def _place(mutant: Mutant) -> str:

@@ -50,7 +50,7 @@ from wamnet.refimpl.encoding import to_display
 from wamnet.refimpl.errors import InputError
 from wamnet.refimpl.frame import SUN, Floats, Frame
 from wamnet.refimpl.network.denoise import Model
-from wamnet.refimpl.network.train import BEST, MIRROR_SHADOWS, MIRRORS, SHADOWS, SHORT, SKY, Recipe
+from wamnet.refimpl.network.train import BEST, MIRROR_SHADOWS, MIRRORS, SHADOWS, SKY, Recipe
 from wamnet.refimpl.network.window import Window
 from wamnet_peers.peer_oidn import filtered, prefiltered
 
@@ -107,7 +107,6 @@ FIVE = (*PAST, "seen_direct")
 """Layers that the page and each target can make and read; bounds of a network of them are below 1 / 255."""
 
 RECIPES: Mapping[str, Recipe] = {
-    "short": SHORT,
     "best": BEST,
     "page": replace(BEST, features=LAMPS, steps=60_000),
     "shadows": SHADOWS,
@@ -174,8 +173,6 @@ ROWS: Mapping[str, Row] = {
         RAYS, quality="high", aux="prefiltered", past=True),
     "oidn-past-apart16": Row("the same, with visible emission subtracted before and added after",
         RAYS, quality="high", aux="prefiltered", past=True, apart=True),
-    "short-1": Row("wamnet, preset `short`, features of 1 ray", 1, "short"),
-    "best-1": Row("wamnet, preset `best`, features of 1 ray", 1, "best"),
     "best-16": Row(f"wamnet, preset `best`, features of {RAYS} rays", RAYS, "best"),
     "page-16": Row(f"wamnet, inputs and steps of the web page, {RAYS} rays", RAYS, "page"),
     "basic-16": Row(f"wamnet, colour, normal and albedo alone, {RAYS} rays", RAYS, "basic"),

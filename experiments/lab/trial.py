@@ -79,7 +79,7 @@ def dotted(path: str) -> str:
     return "wamnet." + path.removesuffix(".py").replace("/", ".")
 
 
-def in_order(folder: Path = vectors.FOLDER) -> list[tuple[str, Case]]:
+def in_order() -> list[tuple[str, Case]]:
     """Return kinds and cases, the most elementary kind first, as blame goes."""
 
     def rank(kind: str) -> int:
@@ -87,7 +87,7 @@ def in_order(folder: Path = vectors.FOLDER) -> list[tuple[str, Case]]:
             (i for i, start in enumerate(ELEMENTARY) if kind.startswith(start)), default=len(ELEMENTARY)
         )
 
-    cases = run.read_vectors(folder)
+    cases = run.read_vectors(vectors.FOLDER)
     return [(kind, case) for kind in sorted(cases, key=rank) for case in cases[kind]]
 
 

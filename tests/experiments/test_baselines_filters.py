@@ -83,15 +83,6 @@ def test_surfaces_do_not_mix(guide):
     assert np.max(np.abs(mixed - color)) > 0.1
 
 
-def test_a_slanted_surface_is_one():
-    """Where depth rises evenly, each tap differs by what the slope allows: a factor of 1/e."""
-    depth = np.broadcast_to(np.linspace(1.0, 4.0, 16)[:, None, None], (16, 16, 1))
-    guides = atrous.guides_of(frame(np.zeros((16, 16, 3)), depth=depth))
-    weight = atrous.geometry_weight(guides, 2, 0, Settings())
-    assert np.max(np.abs(weight[:14] - np.exp(-0.4 / (0.4 + atrous.DEPTH_EPSILON)))) <= 60 * ULP
-    assert np.all(weight[14:] == 0.0)
-
-
 def test_albedo_is_kept_apart():
     """A texture in albedo under constant light comes back as it was."""
     albedo = np.random.default_rng(3).uniform(0.1, 0.9, (16, 16, 3))
@@ -110,12 +101,6 @@ def test_noise_falls():
     noise = np.random.default_rng(4).exponential(1.0, (32, 32, 1)) * np.ones(3)
     found = atrous.denoise(frame(0.5 * noise), Settings())
     assert np.var(found) < 0.1 * np.var(0.5 * noise)
-
-
-def test_neighbours():
-    values = np.arange(6.0).reshape(2, 3)
-    assert atrous.shifted(values, 0, 1).tolist() == [[1, 2, 2], [4, 5, 5]]
-    assert atrous.shifted(values, -1, 0, outside=9.0).tolist() == [[9, 9, 9], [0, 1, 2]]
 
 
 # ---- blocks ----------------------------------------------------------------------------------------------
@@ -148,14 +133,6 @@ def test_the_scene_s_own_edges_do_not_count():
     noise = np.random.default_rng(5).normal(0.0, 0.1, scene.shape)
     assert blockiness([(scene, scene)], 4) == 1.0
     assert blockiness([(scene + noise, scene)], 4) == blockiness([(noise + scene, scene)], 4)
-
-
-def test_noise_has_no_blocks():
-    noise = np.random.default_rng(6).normal(0.0, 0.1, (128, 128, 3))
-    # Mean of 2 x 7 x 128 x 3 differences at borders (patches of 16); |difference| of normal numbers has a
-    # deviation
-    # of 0.756 of its mean, neighbours share a pixel; five deviations of the mean: a chance below 1e-6.
-    assert abs(blockiness([(noise, np.zeros_like(noise))], 16) - 1.0) <= 5 * 0.756 / np.sqrt(2 * 7 * 128 * 3)
 
 
 def test_pictures_without_borders_are_refused():

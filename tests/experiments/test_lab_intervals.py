@@ -45,22 +45,6 @@ def test_seeds_and_poses_are_drawn_independently():
     assert_is_quantile(found.high, 0.975, exact)
 
 
-def test_coverage_is_that_of_student_s_statistic():
-    """The ends are mean -+ z s sqrt((n - 1) / n) / sqrt(n): Student's t says how often the mean is inside."""
-    n, trials = 30, 600
-    samples = np.random.default_rng(3).normal(5.0, 2.0, (trials, n))
-    found = [interval(sample, resamples=1000) for sample in samples]
-    held = sum(one.low <= 5.0 <= one.high for one in found)
-    # An end from 1000 draws is that of another level: three standard deviations of a binomial share.
-    slack = 3.0 * math.sqrt(0.025 * 0.975 / 1000.0)
-    z = stats.norm.isf(0.025)
-    coverage = 1.0 - 2.0 * stats.t.sf(z * math.sqrt((n - 1) / n), n - 1)
-    low = stats.binom.ppf(ALPHA / 2, trials, coverage - 2.0 * slack)
-    high = stats.binom.ppf(1.0 - ALPHA / 2, trials, min(coverage + 2.0 * slack, 1.0))
-    assert 0.93 <= coverage <= 0.95
-    assert low <= held <= high
-
-
 def test_what_methods_share_cancels_in_their_difference():
     poses = np.random.default_rng(5).normal(30.0, 3.0, 8)
     mine, other = np.array([[1.0], [1.2], [0.8]]) + poses, poses[None]

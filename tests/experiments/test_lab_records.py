@@ -1,16 +1,14 @@
 """Nothing becomes a record that cannot be trusted; what does keeps what was found."""
 
-import json
 import math
 
 import publish
 import pytest
 from lab import printed, texts
-from lab.records import Records, bench_of, checked, flat, nested, of_bench
+from lab.records import Records, checked, flat, nested, of_bench
 from lab.results import Results, summary
 from results_of import data_of
 
-from wamnet.cli.reports import bench_report
 from wamnet.refimpl.errors import InputError
 
 
@@ -95,29 +93,6 @@ def test_a_benchmark_becomes_a_record():
     assert checked(found)["commands"] == ["wamnet bench"]
     assert flat({"a": {"b": {"c": 1}, "d": None}}) == {"a.b.c": 1}
     assert nested({"a.b.c": 1, "a.e": 2, "f": 3}) == {"a": {"b": {"c": 1}, "e": 2}, "f": 3}
-
-
-def test_a_record_of_a_benchmark_shows_what_the_benchmark_showed(tmp_path):
-    """The table, and the marks of the picture: of kernels, one without a bound, and of another denoiser."""
-    ms = {"median": 2.0, "min": 1.0, "max": 3.0, "spread": 1.0, "rounds": [1.0, 2.0, 3.0]}
-    loss = {"psnr_db": 35.0, "psnr_loss_db": 0.25, "psnr_frames_db": [35.0]}
-    bounds = {"max": 2e-7, "bound": 1e-5, "bound_all": 1e-4, "certified": True}
-    kernel = {"kind": "kernel", "executor": "opencl", "schedule": "tile:16", "window": 8, "rank": None}
-    kernel |= {"parameters": 100, "ms": ms, "kernel_ms": None, "quality": loss, "reason": ""}
-    rows = [
-        {**kernel, "name": "opencl:tile:16:window8", "profile": "ieee", "degree": 11, "rounding": bounds},
-        {**kernel, "name": "opencl:tile:16:native", "profile": "native", "degree": None}
-        | {"rounding": {**bounds, "bound": None, "bound_all": None, "certified": False}},
-        {"name": "oidn:high", "kind": "peer", "ms": ms, "quality": loss, "reason": "", "executor": None},
-        {"name": "torch", "kind": "peer", "ms": None, "reason": "not installed"},
-    ]
-    front = {"error": [], "quality": ["oidn:high"], "rounding": ["opencl:tile:16:window8"]}
-    data = {"schema": "wamnet-bench-2", "contenders": rows, "network": {"window": 12}, "front": front}
-    data |= {"size_px": 64, "unseen_frames": 1, "frames": {"draws": []}, "sizes": [], "limits": None}
-    (tmp_path / "bench-x.json").write_text(json.dumps(checked(of_bench(data, "wamnet bench"))))
-    again = bench_of(Records(tmp_path)["bench-x"])
-    assert bench_report.table(again) == bench_report.table(data)
-    assert bench_report.panels(again) == bench_report.panels(data)
 
 
 def test_what_is_shown_of_departures_follows_from_their_values():

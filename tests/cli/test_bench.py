@@ -10,8 +10,7 @@ import pytest
 
 from wamnet.cli.commands import bench, bench_frames
 from wamnet.cli.common import inputs
-from wamnet.cli.reports import bench_report, plots
-from wamnet.compiler.targets import DENOISERS
+from wamnet.cli.reports import bench_report
 from wamnet.kernels.bench import contest, rates
 from wamnet.models.data.frame_plan import frame_draws
 from wamnet.models.model_file import load_model, save_model
@@ -312,10 +311,6 @@ def test_rows_are_sorted_and_have_dashes() -> None:
     assert rows[2][1] == "5,000"
 
 
-def test_every_executor_of_the_benchmark_has_a_marker() -> None:
-    assert set(plots.MARKERS) == set(DENOISERS)
-
-
 TRADED = {"ms": {"median": 20.0, "min": 19.0, "max": 25.0, "spread": 0.3, "rounds": [20.0]}}
 """Times of the rows below."""
 
@@ -368,11 +363,3 @@ def test_the_picture_has_a_panel_of_loss_and_one_of_bounds() -> None:
     assert [mark.y for mark in marks.values()] == [1e-5, 1e-5, None, None, None]
     assert [mark.y for mark in loss.marks] == [-0.001, 1.0, -0.001, -0.001, 3.0]
     assert [mark.on_front for mark in loss.marks] == [True, False, False, False, False]
-
-
-def test_the_picture_is_a_function_of_the_data() -> None:
-    """Again from the JSON to the same bytes; there is none without numbers."""
-    data = {**json.loads(json.dumps(traded())), "unseen_frames": 1}
-    first, again = (bench_report.draw(data, plots.PAPER)["trade-off"] for _ in range(2))
-    assert first == again
-    assert not bench_report.panels(planted())

@@ -115,15 +115,6 @@ def test_compile_writes_a_scene_s_kernel(wamnet, here, target, source) -> None:
     assert (here / "b" / source).read_text() == kernel.source
 
 
-def test_a_schedule_by_name(wamnet, here) -> None:
-    """The kernel's manifest names it."""
-    opencl = ["--target", "opencl", "-o", "kernel"]
-    outcome = wamnet("compile", "model.safetensors", *opencl, "--schedule", "tile:8")
-    assert outcome.status == 0
-    assert "schedule" not in outcome.out
-    assert json.loads((here / "kernel/manifest.json").read_text())["schedule"]["name"] == "tile:8"
-
-
 def test_the_frame_s_layers_are_kept(wamnet, here, picture) -> None:
     """FRM-7: the same pixels as without, as linear radiance in a layer of their own."""
     outcome = wamnet("denoise", "model.safetensors", "noisy.exr", "--keep-layers", "-o", "all.exr")

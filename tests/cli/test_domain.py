@@ -3,7 +3,6 @@
 import shutil
 from dataclasses import replace
 
-import numpy as np
 import pytest
 
 from wamnet.cli.common.domain import Watch
@@ -105,12 +104,3 @@ def test_training_states_the_domain(wamnet, here) -> None:
     assert (found.frames, found.features) == (LEARNED, ("color", "normal"))
     assert wamnet("train", *named[:4], *short, "-o", "one.safetensors").status == 0
     assert domain.DOMAIN not in load_model(here / "one.safetensors").info
-
-
-def test_distances_are_of_the_frame_s_own_numbers(here) -> None:
-    """A pixel that is not a number counts as 0, as it does to the network."""
-    model, frame = load_model(here / "m.safetensors"), exr.read_frame(here / "own.exr")
-    frame["color"][0, 0] = np.nan
-    zero = Frame({**frame.layers, "color": np.nan_to_num(frame["color"])})
-    found = domain.of_model(model)
-    assert domain.measure_frame(found, model, frame) == domain.measure_frame(found, model, zero)

@@ -245,16 +245,6 @@ def test_a_picture_is_written_beside_all_channels_of_its_source(tmp_path: Path) 
         assert file.header()["BlenderMultiChannel"] == "Blender V2.55.1 and newer"
 
 
-def test_a_file_of_ours_gets_a_layer_without_a_prefix(tmp_path: Path) -> None:
-    frame = random_frame(2, 3)
-    exr.write_frame(tmp_path / "in.exr", frame)
-    black = np.zeros((2, 3, 3))
-    assert exr.write_denoised(tmp_path / "out.exr", tmp_path / "in.exr", black, keep=True) == "wamnet"
-    again = exr.read_frame(tmp_path / "out.exr")
-    assert again.info == frame.info
-    assert all((again[name] == values).all() for name, values in frame.layers.items())
-
-
 def test_one_of_several_view_layers_is_read_by_its_name(tmp_path: Path) -> None:
     given = blender_like("front", "back")
     path = write(tmp_path / "in.exr", dict(given))
@@ -281,13 +271,6 @@ def test_every_part_is_kept(tmp_path: Path) -> None:
     assert (left.name(), left.header["view"], set(left.channels)) == ("left", "left", set("RGB"))
     assert set(right.channels) == {*"RGB", *(f"wamnet.{name}" for name in "RGB")}
     assert (right.channels["R"].pixels == 2).all()
-
-
-def test_float64_is_rounded_to_float32(tmp_path: Path) -> None:
-    """EXR has no wider float; rounding is NumPy's, to nearest."""
-    frame = Frame({"color": np.random.default_rng(1).random((4, 5, 3))})
-    exr.write_frame(tmp_path / "a.exr", frame)
-    assert (exr.read_frame(tmp_path / "a.exr")["color"] == frame["color"].astype(np.float32)).all()
 
 
 def test_what_others_see(tmp_path: Path) -> None:

@@ -16,21 +16,6 @@ START = b"\x76\x2f\x31\x01\x02\0\0\0"
 PIXELS = {"R": np.ones((2, 3), np.float32)}
 
 
-def test_parts_are_as_another_program_wrote_them(tmp_path: Path) -> None:
-    """Names, windows, text of several kinds, channels and their sampling, which parts are deep."""
-    header = {"type": OpenEXR.scanlineimage, "owner": "André ✓", "multiView": ["l", "r"]}
-    samples = np.empty((2, 3), object)
-    samples[:] = [[np.ones(2, np.float32)] * 3] * 2
-    deep = {"type": OpenEXR.deepscanline, "compression": OpenEXR.ZIPS_COMPRESSION}
-    parts = [OpenEXR.Part(header, dict(PIXELS), "a"), OpenEXR.Part(deep, {"R": samples}, "b")]
-    OpenEXR.File(parts).write(str(tmp_path / "a.exr"))
-    flat, other = read_headers(tmp_path / "a.exr").parts
-    assert (flat.text("name"), flat.text("owner"), flat.text("none")) == ("a", "André ✓", "")
-    assert (flat.texts("multiView"), flat.texts("none")) == (["l", "r"], [])
-    assert (flat.window, flat.channels, flat.deep) == ((0, 0, 2, 1), {"R": (1, 1)}, False)
-    assert other.deep
-
-
 def test_text_in_no_encoding(tmp_path: Path) -> None:
     """The package reads a copy in UTF-8, and the bytes come back to what it writes."""
     owner = attribute("owner", "string", b"Andr\xe9")
@@ -62,3 +47,18 @@ def test_each_cause_has_its_message(tmp_path: Path, content: bytes, rule: str) -
     (tmp_path / "a.exr").write_bytes(content)
     with pytest.raises(InputError, match=rule):
         read_headers(tmp_path / "a.exr")
+
+
+def test_parts_are_as_another_program_wrote_them(tmp_path: Path) -> None:
+    """Names, windows, text of several kinds, channels and their sampling, which parts are deep."""
+    header = {"type": OpenEXR.scanlineimage, "owner": "André ✓", "multiView": ["l", "r"]}
+    samples = np.empty((2, 3), object)
+    samples[:] = [[np.ones(2, np.float32)] * 3] * 2
+    deep = {"type": OpenEXR.deepscanline, "compression": OpenEXR.ZIPS_COMPRESSION}
+    parts = [OpenEXR.Part(header, dict(PIXELS), "a"), OpenEXR.Part(deep, {"R": samples}, "b")]
+    OpenEXR.File(parts).write(str(tmp_path / "a.exr"))
+    flat, other = read_headers(tmp_path / "a.exr").parts
+    assert (flat.text("name"), flat.text("owner"), flat.text("none")) == ("a", "André ✓", "")
+    assert (flat.texts("multiView"), flat.texts("none")) == (["l", "r"], [])
+    assert (flat.window, flat.channels, flat.deep) == ((0, 0, 2, 1), {"R": (1, 1)}, False)
+    assert other.deep

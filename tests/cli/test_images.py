@@ -18,15 +18,6 @@ from wamnet.refimpl.errors import InputError
 from wamnet.refimpl.frame import Frame
 
 
-@given(st.integers(1, 20), st.integers(1, 20), st.integers(0, 99))
-def test_png_round_trip(tmp_path_factory: pytest.TempPathFactory, height: int, width: int, seed: int) -> None:
-    """Levels come back exactly."""
-    path = tmp_path_factory.mktemp("png") / "a.png"
-    levels = np.random.default_rng(seed).integers(0, 256, (height, width, 3), dtype=np.uint8)
-    write_png(path, encoding.from_8bit(levels))
-    assert (encoding.to_8bit(read_png(path)) == levels).all()
-
-
 def test_row_0_is_the_top(tmp_path: Path) -> None:
     """As another program sees it: x to the right, y down."""
     picture = np.zeros((2, 3, 3))

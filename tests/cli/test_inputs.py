@@ -231,11 +231,3 @@ def test_a_frame_of_another_scene_is_denoised_with_a_warning(wamnet, here) -> No
     assert outcome.status == 0
     assert "noisy.exr: it shows minicubes, but the model was trained only on cornell" in outcome.out
     assert (here / "denoised.png").exists()
-
-
-def test_the_longest_name_and_exposure_are_taken(wamnet, here) -> None:
-    """255 bytes: the temporary file's name must not be longer."""
-    assert wamnet("compare", "noisy.exr", "reference.exr", "--exposure", 64).status == 0
-    name = "n" * 251 + ".png"
-    assert wamnet("render", "minicubes", "--width", 2, "--height", 2, "-o", name).status == 0
-    assert (here / name).is_file()

@@ -40,14 +40,6 @@ def test_double_precision_and_parameters(wamnet, tmp_path) -> None:
     assert (exr.read_frame(tmp_path / "f.exr")["color"] == want["color"].astype(np.float32)).all()
 
 
-def test_three_numbers(wamnet, tmp_path) -> None:
-    """A colour is three numbers."""
-    arguments = "--set warm=1,0,0 --width 4 --height 3 -o a.exr"
-    assert wamnet("render", "minicubes", *arguments.split()).status == 0
-    want = scene_digest(canonical("minicubes", warm=(1.0, 0.0, 0.0)))
-    assert exr.read_frame(tmp_path / "a.exr").info["scene_digest"] == want
-
-
 def test_what_is_seen_past_mirrors(wamnet, tmp_path) -> None:
     """On request the file has four layers more, and all others as without."""
     size = ("--width", 6, "--height", 4)

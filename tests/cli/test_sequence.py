@@ -72,11 +72,6 @@ def test_results_have_the_names_or_the_numbers_of_the_frames(output):
     assert outputs_of(frames[:1], Path("one.png")) == [Path("one.png")]
 
 
-def test_the_number_of_a_frame_is_what_varies():
-    frames = [Path(f"in/s.{number}_v2.exr") for number in ("0009", "0010")]
-    assert outputs_of(frames, Path("out/%03d.exr")) == [Path("out/009.exr"), Path("out/010.exr")]
-
-
 REFUSED = {
     "one.png": (["a1.exr", "a2.exr"], "2 frames need a folder, or a pattern"),
     "o": (["x/a1.exr", "y/a1.exr"], "both x/a1.exr and y/a1.exr"),

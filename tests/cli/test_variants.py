@@ -72,7 +72,12 @@ def test_a_curve_is_chosen_from(wamnet, here) -> None:
     assert "chosen: full, schedule plain" in outcome.out
 
 
+AGAIN = ("train", "-i", "noisy.exr", "-t", "reference.exr", "--from", "model.safetensors")
+"""A model is trained further."""
+
 REFUSED = {
+    "--variant 'half16': weights are rounded to halves when a kernel is compiled, not trained":
+        (*AGAIN, "--variant", "half16"),
     "variant 'rank': 'rank' is not an approximation": (*COMPILE, "--variant", "rank"),
     "variant 'window9': the window has 4 x 4 taps": (*COMPILE, "--variant", "window9"),
     "--variant 'full': --max-ms chooses a variant itself": (*COMPILE, "--variant", "full", "--max-ms", 3),
@@ -91,8 +96,7 @@ REFUSED = {
         "--variant", "window3"),),
     "--variant 'window3': is derived from a trained model": (*("train", "-i", "noisy.exr", "-t",
         "reference.exr", "--variant", "window3"),),
-    "--variant 'window3': it chooses what --rank does": (*("train", "-i", "noisy.exr", "-t", "reference.exr",
-        "--from", "model.safetensors"), *("--variant", "window3", "--rank", 2)),
+    "--variant 'window3': it chooses what --rank does": (*AGAIN, "--variant", "window3", "--rank", 2),
     "minicubes is a scene, whose kernels have one schedule, no variants": (*("compile", "minicubes",
         "--target", "opencl", "--variant", "rank2"),),
 }  # fmt: skip
@@ -104,10 +108,6 @@ def test_refusals(refused, here, message) -> None:
     assert message in refused(*REFUSED[message])
 
 
-AGAIN = ("train", "-i", "noisy.exr", "-t", "reference.exr", "--from", "model.safetensors")
-"""A model is trained further."""
-
-
 def test_a_sine_is_not_trained(refused, here, monkeypatch) -> None:
     from wamnet.compiler.core import sine
 
@@ -115,11 +115,6 @@ def test_a_sine_is_not_trained(refused, here, monkeypatch) -> None:
     monkeypatch.setattr(sine, "POLYNOMIALS", {7: polynomial, sine.DEGREE: polynomial})
     line = refused(*AGAIN, "--variant", "sine7")
     assert "--variant 'sine7': the degree of a sine is chosen when a kernel is compiled, not trained" in line
-
-
-def test_halves_are_not_trained(refused, here) -> None:
-    line = refused(*AGAIN, "--variant", "half16")
-    assert "--variant 'half16': weights are rounded to halves when a kernel is compiled, not trained" in line
 
 
 def test_a_data_set_without_test_frames_measures_nothing(refused, wamnet, here) -> None:

@@ -133,63 +133,26 @@ CASES = {
     "lower": ([("Conv", "xw", "y", {"auto_pad": "SAME_LOWER"})], {"w": W[:3, :, :2, :2]}),
     "dilated": ([("Conv", "xw", "y", {"pads": [2, 2, 2, 2], "dilations": [2, 2]})], {"w": W[:3]}),
     "groups": ([("Conv", "xw", "y", {"pads": [1, 1, 1, 1], "group": 2})], {"w": W[:2, :1]}),
-    "leaky": (
-        [
-            ("Conv", "xw", "a", {"pads": [1] * 4}),
-            ("LeakyRelu", "a", "b", {"alpha": 0.25}),
-            ("Conv", "bv", "y"),
-        ],
-        {"w": W, "v": V},
-    ),
-    "hidden clip": (
-        [("Conv", "xw", "a", {"pads": [1] * 4}), ("Clip", "alh", "b"), ("Conv", "bv", "y")],
-        {"w": W, "v": V, "l": -0.5, "h": 0.75},
-    ),
-    "two linear": (
-        [("Conv", "xw", "a", {"pads": [1] * 4}), ("Mul", "ma", "b"), ("Conv", "bv", "c"), ("Sub", "dc", "y")],
-        {"w": W, "v": V, "m": np.float32([[[1]], [[2]], [[3]], [[0.3]]]), "d": 0.7},
-    ),
-    "cropped skip": (
-        [
-            ("Pad", "xp", "a"),
-            ("Conv", "aw", "b"),
-            ("Relu", "b", "c"),
-            ("Conv", "cv", "d"),
-            ("Slice", "astq", "e"),
-            ("Add", "de", "y"),
-        ],
-        {"w": W, "v": V, "p": PADS, "s": np.array([1, 1]), "t": np.array([-1, -1]), "q": np.array([2, 3])},
-    ),
-    "negative skip": (
-        [
-            ("Conv", "xv", "a"),
-            ("Relu", "a", "b"),
-            ("Conv", "bu", "c"),
-            ("Relu", "c", "d"),
-            ("Sub", "xd", "e"),
-            ("Div", "ek", "f"),
-            ("Neg", "f", "y"),
-        ],
-        {"v": V.reshape(4, 2, 1, 1), "u": V, "k": 3.0},
-    ),
+    "leaky": ([("Conv", "xw", "a", {"pads": [1] * 4}), ("LeakyRelu", "a", "b", {"alpha": 0.25}),
+        ("Conv", "bv", "y")], {"w": W, "v": V}),
+    "hidden clip": ([("Conv", "xw", "a", {"pads": [1] * 4}), ("Clip", "alh", "b"), ("Conv", "bv", "y")],
+        {"w": W, "v": V, "l": -0.5, "h": 0.75}),
+    "two linear": ([("Conv", "xw", "a", {"pads": [1] * 4}), ("Mul", "ma", "b"), ("Conv", "bv", "c"),
+        ("Sub", "dc", "y")], {"w": W, "v": V, "m": np.float32([[[1]], [[2]], [[3]], [[0.3]]]), "d": 0.7}),
+    "cropped skip": ([("Pad", "xp", "a"), ("Conv", "aw", "b"), ("Relu", "b", "c"), ("Conv", "cv", "d"),
+        ("Slice", "astq", "e"), ("Add", "de", "y")],
+        {"w": W, "v": V, "p": PADS, "s": np.array([1, 1]), "t": np.array([-1, -1]), "q": np.array([2, 3])}),
+    "negative skip": ([("Conv", "xv", "a"), ("Relu", "a", "b"), ("Conv", "bu", "c"), ("Relu", "c", "d"),
+        ("Sub", "xd", "e"), ("Div", "ek", "f"), ("Neg", "f", "y")],
+        {"v": V.reshape(4, 2, 1, 1), "u": V, "k": 3.0}),
     "last sine": ([("Conv", "xv", "a"), ("Sin", "a", "y")], {"v": V.reshape(4, 2, 1, 1)}),
-    "normalised": (
-        [("Conv", "xv", "a"), ("BatchNormalization", "agbcd", "e"), ("Relu", "e", "y")],
-        {"v": V.reshape(4, 2, 1, 1), **{n: np.float32([1, 2, 0.5, 3]) for n in "gbcd"}},
-    ),
-    "axes": (
-        [
-            ("Transpose", "x", "a", {"perm": [0, 2, 3, 1]}),
-            ("MatMul", "am", "b"),
-            ("Relu", "b", "c"),
-            ("Transpose", "c", "d", {"perm": [0, 3, 1, 2]}),
-            ("Slice", "dstq", "e"),
-            ("Concat", "ex", "f", {"axis": 1}),
-            ("Clip", "fl", "y"),
-        ],
-        {"m": M, "s": np.array([1]), "t": np.array([3]), "q": np.array([1]), "l": 0.25},
-    ),
-}
+    "normalised": ([("Conv", "xv", "a"), ("BatchNormalization", "agbcd", "e"), ("Relu", "e", "y")],
+        {"v": V.reshape(4, 2, 1, 1), **{n: np.float32([1, 2, 0.5, 3]) for n in "gbcd"}}),
+    "axes": ([("Transpose", "x", "a", {"perm": [0, 2, 3, 1]}), ("MatMul", "am", "b"), ("Relu", "b", "c"),
+        ("Transpose", "c", "d", {"perm": [0, 3, 1, 2]}), ("Slice", "dstq", "e"),
+        ("Concat", "ex", "f", {"axis": 1}), ("Clip", "fl", "y")],
+        {"m": M, "s": np.array([1]), "t": np.array([3]), "q": np.array([1]), "l": 0.25}),
+}  # fmt: skip
 """Graphs of two channels: their nodes, whose inputs are letters, and their constants."""
 
 
@@ -314,20 +277,15 @@ def test_graphs_of_other_forms_are_refused(tmp_path):
 @pytest.mark.parametrize(
     ("nodes", "constants", "told"),
     [
-        (
-            [("Add", "pq", f"c{at}") for at in range(900)],
+        ([("Add", "pq", f"c{at}") for at in range(900)],
             {"p": np.float32(np.ones((2000, 1))), "q": np.float32(np.ones((1, 2000)))},
-            ".* 4000000: constants of at most 4096 elements",
-        ),
-        (
-            [("Transpose", "w" if at == 0 else [f"t{at - 1}"], f"t{at}") for at in range(900)],
-            {"w": np.float32(np.ones((400, 400)))},
-            "at most 4194304 elements of all computed constants",
-        ),
+            ".* 4000000: constants of at most 4096 elements"),
+        ([("Transpose", "w" if at == 0 else [f"t{at - 1}"], f"t{at}") for at in range(900)],
+            {"w": np.float32(np.ones((400, 400)))}, "at most 4194304 elements of all computed constants"),
         ([("Concat", ["x"] * 10**5, "a", {"axis": 1})], {}, "inputs of nodes 100001: at most 16384"),
         ([("Div", "pq", "c")], {"p": np.array([-3]), "q": np.array([2])}, "only integers of at least 0"),
     ],
-)
+)  # fmt: skip
 def test_constants_are_limited(nodes, constants, told, tmp_path):
     path = graph(tmp_path / "graph.onnx", [*nodes, ("Relu", "x", "y")], constants)
     with pytest.raises(InputError, match=told):

@@ -43,57 +43,23 @@ RIGHT = {
     "squeeze without axes": ([("Squeeze", "x", "y")], {}, (1, "n", 3), {"opset": 11, "rank": 2}),
     "normalised": ([("BatchNormalization", "xabcd", "y", {"training_mode": 0})], NORM, SHAPE, {}),
     "inference": ([("Dropout", "xrt", "y")], {"r": 0.5, "t": np.array(False)}, SHAPE, {}),
-    "a row and a scalar": (
-        [("Gemm", "xmc", "a"), ("Gemm", "ams", "y", {"transB": 1, "beta": 2.0})],
-        {"m": M, "c": M[:1], "s": 3.0},
-        ROWS,
-        {},
-    ),
-    "channels last": (
-        [("Transpose", "x", "a", TO_LAST), ("Reshape", "as", "b"), ("MatMul", "bm", "c"), ("Relu", "c", "y")],
-        {"s": ints(-1, 2), "m": M},
-        SHAPE,
-        {"rank": 2},
-    ),
-    "rows and back": (
-        [
-            ("Transpose", "x", "a", TO_LAST),
-            ("Reshape", "as", "b"),
-            ("Relu", "b", "c"),
-            ("Reshape", "ct", "d"),
-            ("Transpose", "d", "e", TO_FIRST),
-            ("Conv", "ew", "y"),
-        ],
-        {"s": ints(-1, 2), "t": ints(1, 9, 11, 2), "w": W},
-        FIXED,
-        {"border": "zero"},
-    ),
-    "cropped to a size": (
-        [("Conv", "xw", "a", {"pads": [2] * 4}), ("Slice", "abcd", "y")],
-        {"w": W, "b": ints(1, 1), "c": ints(10, 12), "d": ints(2, 3)},
-        FIXED,
-        {},
-    ),
-    "one channel": (
-        [("Slice", "xsea", "b"), ("Reshape", "bt", "c"), ("Transpose", "c", "y", TO_FIRST)],
-        {"s": ints(1), "e": ints(2), "a": ints(1), "t": ints(1, 9, 11, 1)},
-        FIXED,
-        {},
-    ),
-    "integers": (
-        [("Cast", "x", "a", {"to": 1}), ("Mul", "ak", "y")],
-        {"k": 1 / 255},
-        SHAPE,
-        {"dtype": "uint8"},
-    ),
+    "a row and a scalar": ([("Gemm", "xmc", "a"), ("Gemm", "ams", "y", {"transB": 1, "beta": 2.0})],
+        {"m": M, "c": M[:1], "s": 3.0}, ROWS, {}),
+    "channels last": ([("Transpose", "x", "a", TO_LAST), ("Reshape", "as", "b"), ("MatMul", "bm", "c"),
+        ("Relu", "c", "y")], {"s": ints(-1, 2), "m": M}, SHAPE, {"rank": 2}),
+    "rows and back": ([("Transpose", "x", "a", TO_LAST), ("Reshape", "as", "b"), ("Relu", "b", "c"),
+        ("Reshape", "ct", "d"), ("Transpose", "d", "e", TO_FIRST), ("Conv", "ew", "y")],
+        {"s": ints(-1, 2), "t": ints(1, 9, 11, 2), "w": W}, FIXED, {"border": "zero"}),
+    "cropped to a size": ([("Conv", "xw", "a", {"pads": [2] * 4}), ("Slice", "abcd", "y")],
+        {"w": W, "b": ints(1, 1), "c": ints(10, 12), "d": ints(2, 3)}, FIXED, {}),
+    "one channel": ([("Slice", "xsea", "b"), ("Reshape", "bt", "c"), ("Transpose", "c", "y", TO_FIRST)],
+        {"s": ints(1), "e": ints(2), "a": ints(1), "t": ints(1, 9, 11, 1)}, FIXED, {}),
+    "integers": ([("Cast", "x", "a", {"to": 1}), ("Mul", "ak", "y")], {"k": 1 / 255}, SHAPE,
+        {"dtype": "uint8"}),
     "float16": ([("Neg", "x", "a"), ("Relu", "a", "y")], {}, SHAPE, {"dtype": "float16"}),
-    "float64": (
-        [("Clip", "xlh", "y")],
-        {"l": np.array(0.1), "h": np.array(0.7)},
-        SHAPE,
-        {"dtype": "float64"},
-    ),
-}
+    "float64": ([("Clip", "xlh", "y")], {"l": np.array(0.1), "h": np.array(0.7)}, SHAPE,
+        {"dtype": "float64"}),
+}  # fmt: skip
 """Graphs of two channels that are imported: nodes, constants, the input's shape, and options."""
 
 
@@ -111,119 +77,48 @@ def test_right(case, compared, tmp_path):
 
 
 WRONG = {
-    "batch statistics": (
-        [("BatchNormalization", "xabcd", "y m v", {"training_mode": 1})],
-        NORM,
-        SHAPE,
-        r"training_mode=1': training_mode must be 0 \(export the network for inference",
-    ),
-    "batch statistics of old": (
-        [("BatchNormalization", "xabcd", "y m v s t")],
-        NORM,
-        SHAPE,
-        "'y, m, v, s, t': further outputs are for training",
-    ),
-    "random masks": (
-        [("Dropout", "xrt", "y")],
-        {"r": 0.5, "t": np.array(True)},
-        SHAPE,
-        "training_mode=1': must be 0",
-    ),
-    "statistics of rows": (
-        [("Transpose", "x", "a", TO_LAST), ("BatchNormalization", "abcde", "y")],
-        {name: np.float32([1, 2]) for name in "bcde"},
-        (1, 2, 2, 5),
-        "axis 1 must be the channels",
-    ),
-    "columns before rows": (
-        [
-            ("Transpose", "x", "a", {"perm": [0, 3, 2, 1]}),
-            ("Reshape", "as", "b"),
-            ("Transpose", "b", "y", TO_FIRST),
-        ],
-        {"s": ints(1, 9, 9, 2)},
-        (1, 2, 9, 9),
-        "axes of the output '1, C, W, H': .* not transposed",
-    ),
-    "a column": (
-        [("Gemm", "xmc", "y", {"transB": 1})],
-        {"m": M.T, "c": np.ones((3, 1))},
-        (3, 2),
-        r"a constant of shape \(3, 1\) beside axes N, C': one number, or one for each channel",
-    ),
-    "a matrix": (
-        [("Gemm", "xmc", "y")],
-        {"m": M, "c": np.float32(np.ones((3, 3)))},
-        (3, 2),
-        r"a constant of shape \(3, 3\) beside axes N, C",
-    ),
-    "leading axes": (
-        [("Add", "xc", "y")],
-        {"c": np.float32(np.ones((2, 1, 1)))},
-        ROWS,
-        r"a constant of shape \(2, 1, 1\) beside axes 1, N, C",
-    ),
-    "another mode": (
-        [("Conv", "xw", "y", {"auto_pad": "SAME"})],
-        {"w": W},
-        SHAPE,
-        "auto_pad=SAME': auto_pad must be NOTSET or SAME_LOWER or",
-    ),
-    "one dilation": (
-        [("Conv", "xw", "y", {"dilations": [2]})],
-        {"w": W},
-        SHAPE,
-        r"dilations=\[2\]': dilations m",
-    ),
-    "two margins": (
-        [("Conv", "xw", "y", {"pads": [1, 1]})],
-        {"w": W},
-        SHAPE,
-        r"pads=\[1, 1\]': pads must be 4",
-    ),
+    "batch statistics": ([("BatchNormalization", "xabcd", "y m v", {"training_mode": 1})], NORM, SHAPE,
+        r"training_mode=1': training_mode must be 0 \(export the network for inference"),
+    "batch statistics of old": ([("BatchNormalization", "xabcd", "y m v s t")], NORM, SHAPE,
+        "'y, m, v, s, t': further outputs are for training"),
+    "random masks": ([("Dropout", "xrt", "y")], {"r": 0.5, "t": np.array(True)}, SHAPE,
+        "training_mode=1': must be 0"),
+    "statistics of rows": ([("Transpose", "x", "a", TO_LAST), ("BatchNormalization", "abcde", "y")],
+        {name: np.float32([1, 2]) for name in "bcde"}, (1, 2, 2, 5), "axis 1 must be the channels"),
+    "columns before rows": ([("Transpose", "x", "a", {"perm": [0, 3, 2, 1]}), ("Reshape", "as", "b"),
+        ("Transpose", "b", "y", TO_FIRST)], {"s": ints(1, 9, 9, 2)}, (1, 2, 9, 9),
+        "axes of the output '1, C, W, H': .* not transposed"),
+    "a column": ([("Gemm", "xmc", "y", {"transB": 1})], {"m": M.T, "c": np.ones((3, 1))}, (3, 2),
+        r"a constant of shape \(3, 1\) beside axes N, C': one number, or one for each channel"),
+    "a matrix": ([("Gemm", "xmc", "y")], {"m": M, "c": np.float32(np.ones((3, 3)))}, (3, 2),
+        r"a constant of shape \(3, 3\) beside axes N, C"),
+    "leading axes": ([("Add", "xc", "y")], {"c": np.float32(np.ones((2, 1, 1)))}, ROWS,
+        r"a constant of shape \(2, 1, 1\) beside axes 1, N, C"),
+    "another mode": ([("Conv", "xw", "y", {"auto_pad": "SAME"})], {"w": W}, SHAPE,
+        "auto_pad=SAME': auto_pad must be NOTSET or SAME_LOWER or"),
+    "one dilation": ([("Conv", "xw", "y", {"dilations": [2]})], {"w": W}, SHAPE,
+        r"dilations=\[2\]': dilations m"),
+    "two margins": ([("Conv", "xw", "y", {"pads": [1, 1]})], {"w": W}, SHAPE,
+        r"pads=\[1, 1\]': pads must be 4"),
     "a scalar weight": ([("Conv", "xw", "y")], {"w": 1.0}, SHAPE, r"weights \(\), constants"),
     "words": ([("Conv", "xw", "y")], {"w": np.array([["a"]])}, SHAPE, "input 1 of object': must be float"),
-    "a weight of one axis": (
-        [("Gemm", "xmc", "y")],
-        {"m": M[0], "c": M[0]},
-        ROWS,
-        r"weights \(3,\)': a matrix",
-    ),
-    "seven constants": (
-        [("Gemm", "xmc", "y")],
-        {"m": M, "c": np.float32(np.ones(7))},
-        ROWS,
-        r"a constant of shape \(7,\)",
-    ),
-    "fewer statistics": (
-        [("BatchNormalization", "xabcd", "y")],
-        NORM | {"d": np.float32([1])},
-        SHAPE,
-        "2 channels, constants",
-    ),
-    "fractions": (
-        [("Slice", "xse", "y")],
-        {"s": np.float32([0.5]), "e": ints(1)},
-        SHAPE,
-        "starts of float32, .*: at most 16 integers",
-    ),
+    "a weight of one axis": ([("Gemm", "xmc", "y")], {"m": M[0], "c": M[0]}, ROWS,
+        r"weights \(3,\)': a matrix"),
+    "seven constants": ([("Gemm", "xmc", "y")], {"m": M, "c": np.float32(np.ones(7))}, ROWS,
+        r"a constant of shape \(7,\)"),
+    "fewer statistics": ([("BatchNormalization", "xabcd", "y")], NORM | {"d": np.float32([1])}, SHAPE,
+        "2 channels, constants"),
+    "fractions": ([("Slice", "xse", "y")], {"s": np.float32([0.5]), "e": ints(1)}, SHAPE,
+        "starts of float32, .*: at most 16 integers"),
     "one margin": ([("Pad", "xp", "y")], {"p": ints(1)}, SHAPE, r"\[1\], constant, 0.0': margins of rows"),
-    "a margin of words": (
-        [("Pad", "xpv", "y")],
-        {"p": ints(0, 0, 1, 1, 0, 0, 1, 1), "v": np.array(["a"])},
-        SHAPE,
-        "value of object, .*: one number of floating point",
-    ),
+    "a margin of words": ([("Pad", "xpv", "y")], {"p": ints(0, 0, 1, 1, 0, 0, 1, 1), "v": np.array(["a"])},
+        SHAPE, "value of object, .*: one number of floating point"),
     "an axis twice": ([("Unsqueeze", "xa", "y")], {"a": ints(0, 0)}, ROWS, r"\[0, 0\]: each axis once, of 4"),
-    "several ends": (
-        [("Clip", "xl", "y")],
-        {"l": np.float32([0, 1])},
-        SHAPE,
-        "min of float32, .*: one number",
-    ),
+    "several ends": ([("Clip", "xl", "y")], {"l": np.float32([0, 1])}, SHAPE,
+        "min of float32, .*: one number"),
     "integers": ([("Div", "xc", "y")], {"c": np.int32([2])}, "int32", "type of the elements 'int32': one of"),
     "bytes": ([("Sub", "xc", "y")], {"c": np.uint8([2])}, "uint8", ".* 'integers': it would round or wrap"),
-}
+}  # fmt: skip
 """Graphs that are rejected: nodes, constants, the input's shape or type, and the message."""
 
 
@@ -281,35 +176,18 @@ ONE = np.float32(np.ones((1, 1, 60, 60)))
 LARGE = {
     "channels": (doubled(60), {}, "node n.* .Concat. '.* numbers': at most"),
     "kernels": ([("Conv", "xw", "a"), ("Conv", "aw", "b")], {"w": ONE}, "numbers': at most"),
-    "a product": (
-        [("MatMul", "xa", "b"), ("Relu", "b", "c"), ("MatMul", "cd", "e")],
+    "a product": ([("MatMul", "xa", "b"), ("Relu", "b", "c"), ("MatMul", "cd", "e")],
         {"a": np.float32(np.ones((5, 20000))), "d": np.float32(np.ones((20000, 5)))},
-        r"\(Relu\) '.* numbers': at most",
-    ),
-    "groups": (
-        [("Cast", "k", "w", {"to": 1}), ("Conv", "xw", "a", {"group": 1000})],
-        {"k": np.ones((1000, 1, 30, 30), np.int8)},
-        "numbers': at most",
-    ),
-    "places": (
-        [
-            node
-            for at in range(4)
-            for node in (
-                ("Conv", [f"r{at}" if at else "x", "w"], f"c{at}"),
-                ("Relu", [f"c{at}"], f"r{at + 1}"),
-            )
-        ],
-        {"w": ONE[:, :, :16, :16]},
-        "positions that a pixel depends on .*: at most 524288 in all layers",
-    ),
+        r"\(Relu\) '.* numbers': at most"),
+    "groups": ([("Cast", "k", "w", {"to": 1}), ("Conv", "xw", "a", {"group": 1000})],
+        {"k": np.ones((1000, 1, 30, 30), np.int8)}, "numbers': at most"),
+    "places": ([node for at in range(4) for node in (("Conv", [f"r{at}" if at else "x", "w"], f"c{at}"),
+        ("Relu", [f"c{at}"], f"r{at + 1}"))], {"w": ONE[:, :, :16, :16]},
+        "positions that a pixel depends on .*: at most 524288 in all layers"),
     "axes": ([("Unsqueeze", "xa", "b")], {"a": np.arange(10**5)}, "axes of int64, .*: at most 16 integers"),
-    "layers": (
-        [("MatMul", [f"t{at - 1}" if at else "x", "w"], f"t{at}") for at in range(900)],
-        {"w": np.float32(np.ones((400, 400)))},
-        "multiplications': at most",
-    ),
-}
+    "layers": ([("MatMul", [f"t{at - 1}" if at else "x", "w"], f"t{at}") for at in range(900)],
+        {"w": np.float32(np.ones((400, 400)))}, "multiplications': at most"),
+}  # fmt: skip
 """Small files that would take gigabytes or minutes: nodes, constants, and the message."""
 
 

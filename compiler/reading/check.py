@@ -182,18 +182,18 @@ def passes_of(schedule: Any) -> Passes | None:
 
 
 def check_items(manifest: Any, tiles: bool) -> None:
-    """Refuse a manifest by which a host would give a kernel other work items than it has."""
+    """Refuse a manifest by which a host would give a kernel other work items, or weights, than it has."""
     schedule = manifest["schedule"]
     items = [schedule.get("pixels", 1), schedule.get("rows", 1), *schedule.get("group", (1, 1))]
     if len(items) != 4 or not all(type(n) is int and n > 0 for n in items):
         raise Wrong("its manifest has work items of no size")
-    target, name = manifest["target"], schedule["name"]
+    target, name, count = manifest["target"], schedule["name"], manifest["weights"]["count"]
     family, _, pixels = name.partition(":")
     right = (name == "plain") <= (items == [1] * 4) and name.startswith("group") == ("group" in schedule)
     in_passes = {key in schedule for key in ("launches", "memory", "items", "entries", "arrays")}
-    right = right and in_passes == {name.startswith("fftpasses")}
+    right = right and in_passes == {name.startswith("fftpasses")} and (count == 0) == (family == "inlined")
     if not right or (family == "group" and str(items[0]) != pixels):
-        raise Wrong(f"its manifest has other work items than schedule {name}")
+        raise Wrong(f"its manifest has other work items, or weights, than schedule {name}")
     title = "GLSL 4.30" if target == "opengl" and family not in ("plain", "inlined") else TITLES[target]
     if not manifest["language"].startswith(title):
         raise Wrong(f"its manifest has language {manifest['language']!r} for target {manifest['target']}")

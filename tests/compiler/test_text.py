@@ -98,6 +98,17 @@ def test_wrong_constants_are_refused(changed_line, tmp_path):
         run_text(*changed(given, line, changed_line(line, a, b)))
 
 
+@pytest.mark.parametrize(
+    ("of", "stated"), [("inlined", "plain"), ("inlined", "packed"), ("plain", "inlined")]
+)
+def test_constants_are_weights_of_their_schedule_only(of, stated, tmp_path):
+    """TXT-7: a host gives a text no weights only where its manifest says that they are constants."""
+    text, held, manifest, weights = parts(kernel(tmp_path, "glsl-es", of))
+    manifest["schedule"]["name"] = stated
+    with pytest.raises(Refused, match=f"or weights, than schedule {stated}"):
+        run_text(text, held, manifest, weights)
+
+
 @pytest.mark.parametrize("target", ["c", "cuda", "opencl", "opengl", "wgsl"])
 @pytest.mark.parametrize("size", [3, 4])
 def test_texts_of_integers_compute_what_is_certified(target, size, tmp_path):

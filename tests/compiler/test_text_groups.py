@@ -40,7 +40,7 @@ def test_groups_compute_what_is_certified(target, schedule, border, activation, 
 def test_a_manifest_whose_schedule_has_other_pixels_is_refused(four, name):
     source, held, manifest, weights = four
     other = {**manifest, "schedule": {**manifest["schedule"], "name": name}}
-    with pytest.raises(Refused, match=f"other work items than schedule {name}"):
+    with pytest.raises(Refused, match=f"other work items, or weights, than schedule {name}"):
         run_text(source, held, other, weights)
 
 

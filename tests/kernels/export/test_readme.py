@@ -115,7 +115,7 @@ def test_it_says_which_file_is_a_translation_that_nobody_reads():
         ("c", {"profile": "native"}, "There is no certificate: nothing is promised of the sine"),
         (ONNX, {}, "There is no certificate: a runtime makes kernels of its own"),
         ("cuda", {"profile": "native"}, "(schedule group:4, profile native) it does not know."),
-        ("glsl-es", {"weights": "inline"}, "(schedule inlined, profile ieee) it does not know."),
+        ("c", {"weights": "inline"}, "(schedule plain, profile ieee) it does not know."),
         ("opencl", {"weights": "uniform"}, "whose kind (schedule plain, profile ieee) it does not know."),
     ],
 )

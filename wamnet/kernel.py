@@ -20,11 +20,11 @@ PLAIN = "plain"
 """The schedule that every target has."""
 
 
-def language_of(target: str, profile: str) -> Language:
+def language_of(name: str, profile: str) -> Language:
     """Return the language of a target under a profile; raise InputError for an unknown target."""
-    if ALIASES.get(target, target) not in LANGUAGES:
-        raise InputError("target", target, "unknown", choice(target, [*ALIASES, *LANGUAGES]))
-    return language_named(target).under(profile)
+    if ALIASES.get(name, name) not in LANGUAGES:
+        raise InputError("target", name, "unknown", choice(name, [*ALIASES, *LANGUAGES]))
+    return language_named(name).under(profile)
 
 
 class CertificateError(WamnetError):

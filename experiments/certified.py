@@ -8,8 +8,8 @@ Each kernel is compiled, its certificate checked by the independent checker, and
 8 bits too, seconds of the checks, and what the reader says. Status 1 if a check fails.
 """
 
+import os
 import sys
-import time
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -58,15 +58,15 @@ def row(model: str, name: str, folder: Path) -> list[str]:
     network = load_model(ROOT / "models" / f"{model}.safetensors")
     plan = plan_model(network, target, schedule, variant or FULL)
     write(compile_plan(plan), folder)
-    begun = time.process_time()
+    begun = sum(os.times()[:4])
     bound = max(check(folder / CERTIFICATE_NAME)["bound"]["output"])
-    checked = time.process_time()
+    checked = sum(os.times()[:4])
     try:
         found = check_text(folder / CERTIFICATE_NAME)
         text = f"computes it: {found['sums']} sums"
     except Unread as error:
         text = f"not checked: {error}"
-    read = time.process_time()
+    read = sum(os.times()[:4])
     proven = "0: the same bits" if bound == 0 else f"{bound:.2g}"
     seconds = [f"{checked - begun:.1f}", text, f"{read - checked:.1f}"]
     return [model, target, schedule, variant or FULL, proven, f"{bound * 255:.2f}", *seconds]

@@ -24,7 +24,7 @@ ALLOWED = {
     "refimpl": {"numpy"},
     "models": {"numpy", "safetensors", "onnx", "google", "bpy"},
     "compiler": {"numpy"},
-    "kernels": {"numpy", "pyopencl", "pocl", "moderngl", "wgpu", "PIL", *PEERS},
+    "kernels": {"numpy", "scipy", "pyopencl", "pocl", "moderngl", "wgpu", "PIL", *PEERS},
     "spec": {"numpy"},
     "cli": {
         "numpy",
@@ -44,7 +44,7 @@ ALLOWED = {
 
 ORDER = tuple(ALLOWED)
 OTHERS = {
-    "spec/conformance/renderers": {"jinja2", "numpy", "typer"},
+    "spec/conformance/renderers": {"jinja2", "numpy", "scipy", "typer"},
     "experiments/peers": {"numpy", "wamnet_verify", *PEERS},
     "course": {"numpy", "typer", "wamnet_verify"},
 }

@@ -5,7 +5,7 @@ verdict does not change from run to run; the significance says how lucky the see
 comparisons, each is tested at the level that Sidak's correction gives [`sidak`], so that the chance of any
 false alarm stays at the stated one. Follows Nori's and Mitsuba's habit of testing samplers and renderers by
 hypothesis tests, and Jung, Hanika and Dachsbacher, "Detecting Bias in Monte Carlo Renderers using Welch's
-t-test", JCGT 9(2), 2020. SciPy's distributions are the oracle of kernels/judge/welch.py, which does without.
+t-test", JCGT 9(2), 2020. SciPy's own test is the oracle of kernels/judge/welch.py.
 """
 
 import numpy as np

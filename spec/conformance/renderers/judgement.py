@@ -22,8 +22,9 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.special import stdtrit
 
-from wamnet.kernels.judge.welch import student_p, welch_p
+from wamnet.kernels.judge.welch import welch_p
 
 from .cases import PROFILES, RULES, Question
 
@@ -157,10 +158,6 @@ def expected(question: Question, profiles: Collection[str]) -> tuple[tuple[float
     return question.answer, ""
 
 
-HALVINGS = 60
-"""Halvings of an interval of t: to the last bit of float64."""
-
-
 def holm(p_values: NDArray[np.float64], significance: float) -> NDArray[np.bool_]:
     """Tell (m,) which of m hypotheses fall: from the least p on, while p <= significance / (those left).
 
@@ -179,15 +176,8 @@ def holm(p_values: NDArray[np.float64], significance: float) -> NDArray[np.bool_
 
 @lru_cache(1024)
 def student_quantile(tail: float, freedom: float) -> float:
-    """Return the t that Student's distribution exceeds with probability `tail` < 1/2, by bisection."""
-    low, high = 0.0, 1.0
-    degrees = np.array(float(freedom))
-    while student_p(np.array(high), degrees) / 2 > tail:
-        high *= 2.0
-    for _ in range(HALVINGS):
-        middle = (low + high) / 2
-        low, high = (middle, high) if student_p(np.array(middle), degrees) / 2 > tail else (low, middle)
-    return high
+    """Return the t that Student's distribution exceeds with probability `tail` < 1/2."""
+    return float(-stdtrit(freedom, tail))
 
 
 def judge(

@@ -1,9 +1,8 @@
-"""Sampling of the distributions that light transport needs, each as three functions.
+"""Sampling of the distributions that light transport needs, each as two functions.
 
 For a distribution X: `sample_x(u, ...)` maps uniform numbers in [0, 1) to a sample, `x_pdf(...)` is the
-density of that sample, `invert_x_sample(...)` gives the uniform numbers back. The triad is pbrt's habit
-(Pharr, Jakob and Humphreys, "Physically Based Rendering", 4th edition, appendix A). Random numbers are
-arguments.
+density of that sample (Pharr, Jakob and Humphreys, "Physically Based Rendering", 4th edition, appendix A).
+Random numbers are arguments.
 
 1. concentric disk: Shirley and Chiu, "A Low Distortion Map Between Disk and Square", 1997.
 2. cosine hemisphere: Malley's method, the disk lifted to the hemisphere around +z; density cos(theta) / pi.
@@ -40,24 +39,6 @@ def sample_concentric_disk(u0: Floats, u1: Floats) -> tuple[Floats, Floats]:
     return radius * np.cos(phi), radius * np.sin(phi)
 
 
-def concentric_disk_pdf(x: Floats, y: Floats) -> Floats:
-    """Return the density 1 / pi, in 1 / area, at x, y (...) of the unit disk."""
-    return 0.0 * (x + y) + INV_PI
-
-
-def invert_concentric_disk_sample(x: Floats, y: Floats) -> tuple[Floats, Floats]:
-    """Return the u0, u1 (...) that [`sample_concentric_disk`] maps to x, y (...)."""
-    # The wedge around the x axis holds |y| < |x|; radius and angle are measured from its signed axis.
-    around_x = np.abs(x) > np.abs(y)
-    axis, other = np.where(around_x, x, y), np.where(around_x, y, x)
-    length = np.sqrt(x * x + y * y)
-    radius = np.where(axis < 0.0, -length, length)
-    ratio = np.arctan(other / np.where(axis == 0.0, _TINY, axis)) * (4.0 / np.pi)
-    a = np.where(around_x, radius, ratio * radius)
-    b = np.where(around_x, ratio * radius, radius)
-    return 0.5 * (a + 1.0), 0.5 * (b + 1.0)
-
-
 def sample_cosine_hemisphere(u0: Floats, u1: Floats) -> Directions:
     """Map u0, u1 (...) to unit directions (..., 3) around +z with density cos(theta) / pi."""
     x, y = sample_concentric_disk(u0, u1)
@@ -69,11 +50,6 @@ def cosine_hemisphere_pdf(cos_theta: Floats) -> Floats:
     return np.maximum(cos_theta, 0.0) * INV_PI
 
 
-def invert_cosine_hemisphere_sample(wi: Directions) -> tuple[Floats, Floats]:
-    """Return the u0, u1 (...) that [`sample_cosine_hemisphere`] maps to wi (..., 3)."""
-    return invert_concentric_disk_sample(wi[..., 0], wi[..., 1])
-
-
 def sample_quad(u0: Floats, u1: Floats, corner: Points, edge_u: Directions, edge_v: Directions) -> Points:
     """Map u0, u1 (...) to points (..., 3) corner + u0 edge_u + u1 edge_v, uniform in area."""
     return corner + vectors.scale(edge_u, u0) + vectors.scale(edge_v, u1)
@@ -83,18 +59,6 @@ def quad_pdf(edge_u: Directions, edge_v: Directions) -> Floats:
     """Return the density 1 / area (...) over the parallelogram that edge_u, edge_v (..., 3) span."""
     normal = vectors.cross(edge_u, edge_v)
     return 1.0 / np.sqrt(vectors.dot(normal, normal))
-
-
-def invert_quad_sample(
-    p: Points, corner: Points, edge_u: Directions, edge_v: Directions
-) -> tuple[Floats, Floats]:
-    """Return the u0, u1 (...) that [`sample_quad`] maps to the points p (..., 3) of the parallelogram."""
-    # Solve p - corner = u0 edge_u + u1 edge_v by the vectors dual to the edges.
-    offset, normal = p - corner, vectors.cross(edge_u, edge_v)
-    square = vectors.dot(normal, normal)
-    u0 = vectors.dot(vectors.cross(offset, edge_v), normal) / square
-    u1 = vectors.dot(vectors.cross(edge_u, offset), normal) / square
-    return u0, u1
 
 
 def sample_discrete(u: Floats, cumulative: Floats) -> Ids:
@@ -113,12 +77,6 @@ def discrete_pdf(index: Ids, cumulative: Floats) -> Floats:
     return vectors.look_up(np.diff(cumulative, prepend=cumulative.dtype.type(0)), index)
 
 
-def invert_discrete_sample(index: Ids, cumulative: Floats) -> Floats:
-    """Return the middle (...) of the uniform numbers that [`sample_discrete`] maps to index (...)."""
-    upper = vectors.look_up(cumulative, index)
-    return upper - 0.5 * discrete_pdf(index, cumulative)
-
-
 def sample_spherical_cauchy(u0: Floats, u1: Floats, concentration: Floats) -> Directions:
     """Map u0, u1 (...) to unit directions (..., 3) around +z, lobed by the concentration k (...) >= 0.
 
@@ -133,13 +91,6 @@ def spherical_cauchy_pdf(versine: Floats, concentration: Floats) -> Floats:
     """Return the density (...), in 1/sr, where 1 - cos to the axis is versine (...): the lobe's shape."""
     spread = 1.0 + concentration * versine
     return (1.0 + 2.0 * concentration) * (0.25 * INV_PI) / (spread * spread)
-
-
-def invert_spherical_cauchy_sample(wi: Directions, concentration: Floats) -> tuple[Floats, Floats]:
-    """Return the u0, u1 (...) that [`sample_spherical_cauchy`] maps to wi (..., 3)."""
-    versine = 1.0 - wi[..., 2]
-    u0 = versine * (1.0 + 2.0 * concentration) / (2.0 * (1.0 + concentration * versine))
-    return u0, 0.5 * (np.arctan2(wi[..., 1], wi[..., 0]) / np.pi + 1.0)
 
 
 def tangent_frame(normal: Normals) -> tuple[Directions, Directions]:

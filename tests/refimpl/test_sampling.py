@@ -2,6 +2,7 @@
 
 from itertools import pairwise
 
+import inverses
 import numpy as np
 import pytest
 from hypothesis import given
@@ -34,13 +35,13 @@ def test_hemisphere_round_trip(u0, u1):
     wi = sampling.sample_cosine_hemisphere(np.float64(u0), np.float64(u1))
     assert wi[2] >= 0.0
     assert abs(vectors.dot(wi, wi) - 1.0) <= 8 * 2.0**-52  # z restores the length to a few roundings
-    v0, v1 = sampling.invert_cosine_hemisphere_sample(wi)
+    v0, v1 = inverses.invert_cosine_hemisphere_sample(wi)
     assert max(abs(v0 - u0), abs(v1 - u1)) <= ROUND_TRIP
 
 
 @pytest.mark.parametrize("index", [0, 1, 3])
 def test_discrete_round_trip(index):
-    u = sampling.invert_discrete_sample(np.array([index]), CUMULATIVE)
+    u = inverses.invert_discrete_sample(np.array([index]), CUMULATIVE)
     assert sampling.sample_discrete(u, CUMULATIVE)[0] == index
 
 
@@ -60,7 +61,7 @@ def test_disk_chi_square():
     x, y = sampling.sample_concentric_disk(*uniforms()[:2])
     radii, angles = np.linspace(0, 1, 17), np.linspace(-np.pi, np.pi, 33)
     observed, _, _ = np.histogram2d(np.hypot(x, y), np.arctan2(y, x), bins=(radii, angles))
-    pdf = sampling.concentric_disk_pdf(np.zeros(1), np.zeros(1))[0]
+    pdf = 1.0 / np.pi
     area = np.outer(np.diff(radii**2) / 2, np.diff(angles))
     assert chi_square_p(observed, pdf * area * SAMPLES) >= SIGNIFICANCE
 
@@ -82,7 +83,7 @@ def test_spherical_cauchy_round_trip(u0, u1, concentration):
     """
     wi = sampling.sample_spherical_cauchy(np.float64(u0), np.float64(u1), concentration)
     assert abs(vectors.dot(wi, wi) - 1.0) <= 16 * 2.0**-52
-    v0, v1 = sampling.invert_spherical_cauchy_sample(wi, concentration)
+    v0, v1 = inverses.invert_spherical_cauchy_sample(wi, concentration)
     assert abs(v0 - u0) <= ROUND_TRIP + (1.0 + 2.0 * concentration) * 2.0**-52
     if wi[0] ** 2 + wi[1] ** 2 > 0.0:
         assert abs(v1 - u1) <= ROUND_TRIP
@@ -108,7 +109,7 @@ def test_spherical_cauchy_chi_square(concentration):
 def test_quad_chi_square():
     """Equal cells of the parallelogram get equal counts, and the density integrates to one over its area."""
     p = sampling.sample_quad(*uniforms()[:2], CORNER, EDGE_U, EDGE_V)
-    u0, u1 = sampling.invert_quad_sample(p, CORNER, EDGE_U, EDGE_V)
+    u0, u1 = inverses.invert_quad_sample(p, CORNER, EDGE_U, EDGE_V)
     observed, _, _ = np.histogram2d(u0, u1, bins=16, range=((0, 1), (0, 1)))
     area = np.linalg.norm(np.cross(EDGE_U, EDGE_V))
     # Some ten roundings.

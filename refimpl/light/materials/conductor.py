@@ -127,22 +127,6 @@ def sample_visible_normal(u0: Floats, u1: Floats, wo: Directions, alpha: Floats)
     return unit(vectors.vector(alpha * n[..., 0], alpha * n[..., 1], np.maximum(n[..., 2], 0.0)))
 
 
-def visible_normal_pdf(m: Normals, wo: Directions, alpha: Floats) -> Floats:
-    """Return the density (...), in 1/sr, of m (..., 3) as seen from wo: 2 (wo . m) D / (q_o + z_o)."""
-    z_o, q_o, _, _ = _heights(wo, wo, alpha)
-    density: Floats = 2.0 * np.maximum(vectors.dot(wo, m), 0.0) * distribution(m, alpha) / (q_o + z_o)
-    return density
-
-
-def invert_visible_normal_sample(m: Normals, wo: Directions, alpha: Floats) -> tuple[Floats, Floats]:
-    """Return the u0, u1 (...) that [`sample_visible_normal`] maps to the normals m (..., 3)."""
-    _, tangent, bitangent, share = _stretched(wo, alpha)
-    n = vectors.normalize(vectors.vector(m[..., 0] / alpha, m[..., 1] / alpha, m[..., 2]))
-    x, y = vectors.dot(n, tangent), vectors.dot(n, bitangent)
-    chord = np.sqrt(np.maximum(1.0 - x * x, 0.0))
-    return sampling.invert_concentric_disk_sample(x, (y - (1.0 - share) * chord) / share)
-
-
 def _stretched(wo: Directions, alpha: Floats) -> tuple[Any, Any, Any, Any]:
     """Return wo's direction (..., 3) where the lobe is a hemisphere, two tangents, and a share (...).
 

@@ -33,4 +33,13 @@ def hemisphere_pdf(direction):
 
 
 def invert_hemisphere_sample(direction):
-    return sampling.invert_cosine_hemisphere_sample(direction)
+    x, y, radius = (
+        direction[..., 0],
+        direction[..., 1],
+        np.sqrt(direction[..., 0] ** 2 + direction[..., 1] ** 2),
+    )
+    wide = np.abs(x) > np.abs(y)
+    axis, other = np.where(wide, x, y), np.where(wide, y, x)
+    r = np.where(axis < 0.0, -radius, radius)
+    turned = r * np.arctan(other / np.where(axis == 0.0, 1e-30, axis)) * (4.0 / np.pi)
+    return 0.5 * (np.where(wide, r, turned) + 1.0), 0.5 * (np.where(wide, turned, r) + 1.0)

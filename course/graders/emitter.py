@@ -31,11 +31,11 @@ from wamnet.compiler.kernel.kernel import (
 )
 from wamnet.compiler.kernel.run import run
 from wamnet.compiler.kernel.verify import KernelError, verify
-from wamnet.compiler.languages.canonical import canonical
 from wamnet.compiler.languages.renderer import Renderer
 from wamnet.compiler.parsing.parse import Unread, parse
 from wamnet.compiler.targets import language_named
 
+from ..canonical import canonical
 from ..frame import Check, Wrong, hold, spread
 from ..wire import Node, Program
 

@@ -11,11 +11,11 @@ from wamnet.compiler import targets
 from wamnet.compiler.compile import compile_program
 from wamnet.compiler.kernel.interface import WEIGHTS
 from wamnet.compiler.kernel.kernel import load, rewritten
-from wamnet.compiler.languages.canonical import canonical
 from wamnet.compiler.parsing.grammar import LANGUAGES as GRAMMARS
 from wamnet.compiler.parsing.parse import parse
 from wamnet.compiler.plan import plan_program
 from wamnet.compiler.schedules.plain import Plain
+from wamnet_course.canonical import canonical
 
 
 class Backwards(Plain):

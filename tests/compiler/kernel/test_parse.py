@@ -35,7 +35,6 @@ from wamnet.compiler.kernel.kernel import (
     name,
 )
 from wamnet.compiler.languages.c import C
-from wamnet.compiler.languages.canonical import canonical
 from wamnet.compiler.languages.cuda import CUDA
 from wamnet.compiler.languages.glsl import GLSL
 from wamnet.compiler.languages.glsl_buffers import Vulkan
@@ -53,6 +52,7 @@ from wamnet.compiler.schedules.tile import Tile
 from wamnet.compiler.targets import LANGUAGES as TARGETS
 from wamnet.compiler.variants import plan_model
 from wamnet.refimpl.network.activation import RELU
+from wamnet_course.canonical import canonical
 
 LANGUAGES = {
     dialect.target: dialect for dialect in (OpenCL(), C(), CUDA(), Metal(), GLSL(), Vulkan(), WGSL())

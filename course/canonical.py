@@ -1,4 +1,4 @@
-"""The one form of kernels that differ only in what their sources do not show [parsing/parse.py].
+"""The one form of kernels that differ only in what their sources do not show [compiler/parsing/parse.py].
 
 Comments, order of operations that is kept, loops that compilers must unroll; the interface's integers and the
 place of the weights; sums of indices, which are written from the left; a value that a variable has for good;
@@ -14,9 +14,9 @@ from typing import Any
 
 import numpy as np
 
-from ..kernel import kernel as tree
-from ..kernel.interface import DENOISE, IMAGE, RESULT, Interface
-from ..kernel.kernel import integer
+from wamnet.compiler.kernel import kernel as tree
+from wamnet.compiler.kernel.interface import DENOISE, IMAGE, RESULT, Interface
+from wamnet.compiler.kernel.kernel import integer
 
 BODIES = ("body", "otherwise")
 """Fields of statements that are statements."""

@@ -17,6 +17,7 @@ import logging
 import os
 import re
 import stat
+import subprocess
 import tempfile
 import time
 from contextlib import suppress
@@ -120,8 +121,7 @@ def new_temporary(name: str, programs: bool = False) -> tuple[Path, int]:
 
 def discard(folder: Path, lock: int) -> None:
     """Remove a temporary folder, unless somebody else did, and give up its lock."""
-    with suppress(OSError):
-        remove(folder)
+    remove(folder)
     os.close(lock)
 
 
@@ -140,44 +140,11 @@ def _remove_left(folder: Path) -> None:
 
 
 def remove(folder: Path) -> None:
-    """Remove a folder and what is in it; no link is followed.
-
-    Neither the depth of a recursion, nor the length of a path, nor the number of open files limits how deep
-    folders in it are: one is open at a time, and `..` of it is the way back.
-    """
-    here = _opened(folder)
-    try:
-        above: list[tuple[str, list[str]]] = []
-        inside = _emptied(here)
-        while inside or above:
-            if inside:
-                name = inside.pop()
-                os.chmod(name, 0o700, dir_fd=here)
-                child = _opened(name, here)
-                os.close(here)
-                here = child
-                above.append((name, inside))
-                inside = _emptied(here)
-            else:
-                parent = _opened("..", here)
-                os.close(here)
-                here = parent
-                name, inside = above.pop()
-                os.rmdir(name, dir_fd=here)
-    finally:
-        os.close(here)
-    folder.rmdir()
+    """Remove a folder and what is in it, however deep; no link is followed."""
+    for program in (("chmod", "-R", "u+rwx"), ("rm", "-rf")):
+        subprocess.run([*program, "--", str(folder)], check=False, capture_output=True)
 
 
-def _opened(name: str | Path, inside: int | None = None) -> int:
+def _opened(folder: Path) -> int:
     """Return a folder, opened; a link to one is an error."""
-    return os.open(name, os.O_RDONLY | os.O_DIRECTORY | os.O_NOFOLLOW, dir_fd=inside)
-
-
-def _emptied(folder: int) -> list[str]:
-    """Remove all but folders from an open folder, and return the folders' names."""
-    entries = list(os.scandir(folder))
-    for entry in entries:
-        if not entry.is_dir(follow_symlinks=False):
-            os.unlink(entry.name, dir_fd=folder)
-    return [entry.name for entry in entries if entry.is_dir(follow_symlinks=False)]
+    return os.open(folder, os.O_RDONLY | os.O_DIRECTORY | os.O_NOFOLLOW)

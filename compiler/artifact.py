@@ -20,12 +20,10 @@ from numpy.typing import NDArray
 from ..models.writing import making_parents, write_together
 from .core.ir import Image
 from .kernel.interface import Interface, staged
+from .proof.evidence import FIRST_PASS as FIRST_PASS
 
 SCHEMA = "wamnet-artifact-1"
 """Name and version of the manifest's form; described in spec/kernel_interface.md."""
-
-FIRST_PASS = "horizontal."
-"""What the names of the first pass's files begin with."""
 
 WEIGHTS_NAME = "weights.bin"
 """File of the weights: little-endian float32, nothing else."""

@@ -154,40 +154,39 @@ def _of_two_passes(plan: Plan, cut: Cut) -> Artifact:
     )
     before = _of_one_pass(horizontal, alone, [("pass", notes[0].split("\n"))], HORIZONTAL)
     found = _of_one_pass(vertical, bound, [("pass", notes[1].split("\n"))])
-    return replace(_joined(before, found, _report(plan, cut)), plan=plan)
+    return replace(_joined(before, found, _report(cut), cut), plan=plan)
 
 
-def _report(plan: Plan, cut: Cut) -> Mapping[str, Any]:
-    """Return what a manifest says about a cut: its own error in the layer, and that of rounding by itself."""
+def _report(cut: Cut) -> Mapping[str, Any]:
+    """Return what a manifest says about a cut: its own error in the layer."""
     weights = left(cut)
     low, high = bounds.window_box(kernel_gather(cut.whole))
     largest = np.maximum(np.abs(low), np.abs(high))
     whole = np.abs(cut.whole.parameters[str(cut.whole.nodes[cut.layer]["weight"])].astype(np.float64))
     layer, reach = (round_up(float((w @ largest).max())) for w in (weights, whole))
-    rounding = bounds.output_errors(cut.whole, plan.enclosures(of_cut=False))[cut.whole.outputs[0][0]]
-    finite = bool(np.isfinite(rounding).all())
     return {
         "rank": cut.rank,
         "program": ir.digest(cut.whole),
         "cut": {"first_layer": layer, "of": reach, "against": "the first layer's sums, before its sine"},
-        "rounding": {
-            "output": [round_up(float(error)) for error in rounding] if finite else None,
-            "against": "float64 reference with the weights that the factors' product is",
-        },
     }
 
 
-def _joined(before: Artifact, found: Artifact, report: Mapping[str, Any]) -> Artifact:
+def _joined(before: Artifact, found: Artifact, report: Mapping[str, Any], cut: Cut) -> Artifact:
     """Return both passes as one artifact, whose manifest holds the first one's."""
+    bound = {**found.manifest["bound"], "against": "float64 reference of the program that was cut"}
+    proven = found.certificate
+    if proven:
+        total = {**proven["bound"], "against": bound["against"]}
+        proven = {**proven, "factored": certificate.factored(cut.whole), "bound": total}
     own = {
         "digest": ir.sha256(f"{before.digest} {found.digest}".encode()),
-        "bound": {**found.manifest["bound"], "against": "float64 reference of the program that was cut"},
+        "bound": bound,
         "factored": {**report, HORIZONTAL: before.manifest},
     }
     for key in ("files", SIZES):
         first = {f"{artifact.FIRST_PASS}{name}": value for name, value in before.manifest[key].items()}
         own[key] = {**first, **found.manifest[key]}
-    return replace(found, manifest={**found.manifest, **own}, before=before)
+    return replace(found, manifest={**found.manifest, **own}, before=before, certificate=proven)
 
 
 def _of_one_pass(plan: Plan, bound: Bound, notes: Sequence[Entry] = (), part: str = "") -> Artifact:

@@ -182,11 +182,14 @@ class Plan:
         errors = bounds.output_errors(program, found)[program.outputs[0][0]]
         if not all(math.isfinite(error) for error in errors):
             return Bound(None, tuple(ranges))
-        proof = None
-        if self.proves and not self.cut:
+        proof, cut = None, None
+        if self.proves and self.cut:
+            cut = self.passes[0].bound.proof and (self.cut.horizontal, self.cut.vertical)
+        if self.proves and (cut or not self.cut):
             from .proof import certificate
 
-            proof = certificate.prove(program, found, self.sine, self.schedule.spectra(program))
+            of = None if cut else self.schedule.spectra(program)
+            proof = certificate.prove(program, found, self.sine, of, cut)
         return Bound(proof.bound if proof else tuple(float(e) for e in errors), tuple(ranges), proof)
 
     @cached_property
@@ -201,8 +204,6 @@ class Plan:
             return ""
         if not self.proves:
             return "it was compiled to be run at once, without one"
-        if self.cut is not None:
-            return "it is two kernels, one after the other, of a first layer that is cut to a rank"
         if self.sine.error is None:
             return f"nothing is promised of the sine ({self.sine.text})"
         return "the program is not a network of sines or rectifiers of the form that the proof knows"

@@ -6,7 +6,7 @@
 3. The program's text, where each weight lies in the kernel's file, digests of both and of the source
    [`certificate`]. Weights that the file does not hold are in the certificate itself.
 
-Programs of another form, kernels in two passes and sines without a promise have no certificate [`prove`].
+Programs of another form and sines without a promise have no certificate [`prove`].
 """
 
 from __future__ import annotations
@@ -51,26 +51,32 @@ def prove(
     found: Sequence[bounds.Enclosure],
     sine: SineContract,
     of: Spectra | None = None,
+    cut: tuple[Program, Program] | None = None,
 ) -> Proof | None:
     """Return the proof for an analysed program over all images, or None where it has no certificate.
 
-    `of`: how the first layer's sums are computed from spectra, if they are.
+    `of`: how the first layer's sums are computed from spectra, if they are. `cut`: the programs of both
+    kernels of a first layer of low rank.
     """
     output = program.outputs[0][1]
     network = scaled.network(program, found, output)
-    if sine.error is None or len(network) < 2 or program.nodes[network[0].read].op != "input":
+    if sine.error is None or not network or program.nodes[network[0].read].op != "input":
         return None
-    if found[network[0].affine].own is None and of is None:  # sums of which the steps know nothing
+    if found[network[0].affine].own is None and of is None and cut is None:  # sums unknown to the steps
         return None
-    arrays = {name: array.astype(np.float64) for name, array in program.parameters.items()}
+    arrays = _floats(program if cut is None else cut[1])
     layers, box = checker.network_of(ir.text(program))
     matrices = [(layer["scale"] or 1.0) * arrays[layer["weight"]] for layer in layers]
-    if not scaled.decomposable(matrices[1:]):
+    if len(layers) > 1 and not scaled.decomposable(matrices[1:]):
         return None
     groups = scaled.outputs(len(matrices[-1]))
-    later = [[*matrices[1:-1], matrices[-1][rows]] for rows in groups]
-    first, joint, choices = None, list[list[float]](), list[dict[str, Any]]()
+    later = [[*matrices[1:-1], matrices[-1][rows]] if len(layers) > 1 else [] for rows in groups]
+    first, joint, choices, steps_of_cut = None, list[list[float]](), list[dict[str, Any]](), None
     try:
+        if cut is not None:
+            weight = _floats(program)[layers[0]["weight"]]
+            texts = ir.text(program), ir.text(cut[0]), ir.text(cut[1])
+            steps_of_cut = checker.cut_steps(texts, (weight, _floats(cut[0]), arrays), sine)
         if of is not None:
             weight, bias = checker.arrays_of(layers[0], arrays)
             tables = Tables(_of(of), weight, bias, (of.table.transpose(1, 2, 0, 3), of.bias), *box[:2])
@@ -79,9 +85,11 @@ def prove(
             choices = _choices(groups, pairs)
             joint = checker.joint_steps(layers, choices, tables)
             first = tables, sum(joint[0]), pairs[0][1][0]
-        steps, own = checker.layer_steps(layers, box, arrays, sine, first)
+        steps, own = checker.layer_steps(layers, box, arrays, sine, first, steps_of_cut)
         if of is None:
-            choices = _choices(groups, [(None, scaled.scalings(each, own[0])) for each in later])
+            choices = _choices(
+                groups, [(None, scaled.scalings(each, own[0]) if each else []) for each in later]
+            )
         outputs = checker.output_steps(layers, arrays, own, choices, joint)
     except Refused:
         return None
@@ -89,6 +97,11 @@ def prove(
         choice["spectra"]["step_bounds"] = [checker.up(step * checker.WIDER) for step in more]
     found_steps = tuple({**choice, **step} for choice, step in zip(choices, outputs, strict=True))
     return Proof(tuple(steps), found_steps, tuple(step["error_bound"] for step in outputs))
+
+
+def _floats(program: Program) -> dict[str, Array]:
+    """Return a program's parameters in float64."""
+    return {name: array.astype(np.float64) for name, array in program.parameters.items()}
 
 
 def _choices(groups: Sequence[Sequence[int]], pairs: Sequence[Any]) -> list[dict[str, Any]]:
@@ -163,6 +176,18 @@ def integers(
     }
 
 
+def factored(whole: Program) -> Mapping[str, Any]:
+    """Return what a certificate says of the program that was cut: its text, and its first matrix."""
+    name = checker.network_of(ir.text(whole))[0][0]["weight"]
+    return {"program": ir.text(whole), "parameters": {name: _held(whole.parameters[name])}}
+
+
+def _held(array: NDArray[Any]) -> dict[str, Any]:
+    """Return a parameter that the certificate itself holds."""
+    held = np.ascontiguousarray(array, "<f4").tobytes()
+    return {"shape": list(array.shape), "base64": base64.b64encode(held).decode()}
+
+
 def _about(
     schema: str, program: Program, schedule: Schedule, emitted: Program, manifest: Mapping[str, Any]
 ) -> dict[str, Any]:
@@ -204,8 +229,7 @@ def _places(common: Program, schedule: Schedule, emitted: Program) -> dict[str, 
             found[name] = {"shape": shape, "offset": int(place[0, 0])}
             found[name] |= {"rows": _listed(rows), "columns": _listed(columns)}
         else:
-            held = np.ascontiguousarray(array, "<f4").tobytes()
-            found[name] = {"shape": shape, "base64": base64.b64encode(held).decode()}
+            found[name] = _held(array)
     return found
 
 

@@ -5,7 +5,8 @@
 2. The text is that of a network of sines or rectifiers; anything else is refused [`_layers`].
 3. Each layer: magnitudes, rounding of sums in parts, the sine's error [`layer_steps`]; each output: how far
    each layer's errors reach, by norms for the scalings in the certificate [`output_steps`]. Sums from spectra
-   have steps of their own [spectra_checker.py].
+   have steps of their own [spectra_checker.py]. Of a first layer of low rank both kernels have a certificate:
+   the second one's sums pass on the first one's bound, and what the rank leaves out [`cut_steps`].
 4. Elimination in integers proves that a matrix has a norm of at most N [`norm_is_below`].
    All other numbers are sums of magnitudes in float64, widened by more than it rounds.
 
@@ -19,18 +20,51 @@ import re
 from decimal import ROUND_CEILING, Decimal
 from fractions import Fraction
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from ...refimpl.reading import refusing
-from .evidence import INTEGERS, NODE, Refused, ends_of_window, inputs_of, read, same
+from .evidence import (
+    FIRST_PASS,
+    INTEGERS,
+    Refused,
+    digest_of,
+    ends_of_window,
+    inputs_of,
+    nodes_of,
+    parameters_of,
+    read,
+    same,
+)
 from .integer_checker import check_integers
 from .sine_checker import PROMISES
 from .spectra_checker import Tables
 
 U, TINY, WIDER = 2.0**-24, 2.0**-126, 1 + 2.0**-34
 """float32's rounding and smallest normal number; a factor of more than float64 can be off in what follows."""
+
+OF_INPUTS = re.compile(r"  (window|image|parameter|%\d+ = input) ")
+"""How the lines begin in which a program that was cut may differ from that of its second kernel."""
+
+
+STATED = {"rank", "program", "cut", "horizontal"}, {"first_layer", "of", "against"}
+"""The keys of a manifest's `factored`, and of its `cut` (FAC-7)."""
+
+
+class Cut(NamedTuple):
+    """The first layer of low rank: `window` is what its second kernel reads, as `network_of` returns it.
+
+    Of its sums (m,): what they are off by beside what the second kernel rounds, and their least and largest
+    values in the reference. `left`: the most that the rank leaves out; `largest`: a sum of all magnitudes.
+    """
+
+    window: tuple[Any, Any, Any]
+    passed: Any
+    least: Any
+    most: Any
+    left: float
+    largest: float
 
 
 def check(path: Path) -> dict[str, Any]:
@@ -44,6 +78,7 @@ def check(path: Path) -> dict[str, Any]:
             return held
         layers, box = network_of(text)
         promise: Any = PROMISES.get(held["sine"]["text"])
+        cut = _cut(path, held, manifest, text, arrays, promise) if "factored" in held else None
         if promise is None or promise.domain != (held["sine"]["domain"] or np.inf):
             raise Refused("sine: nobody promises it")
         stated = manifest["sine"]
@@ -61,7 +96,7 @@ def check(path: Path) -> dict[str, Any]:
                 wanted = [up(step * WIDER) for step in added]
                 _at_least("spectra: step_bounds", output["spectra"]["step_bounds"], wanted)
             first = tables, sum(joint[0]), np.array(held["outputs"][0]["scalings"][0], np.float64)
-        found, own = layer_steps(layers, box, arrays, promise, first)
+        found, own = layer_steps(layers, box, arrays, promise, first, cut)
         for number, step in enumerate(found):
             same(f"layer {number}: node", held["layers"][number]["node"], step.pop("node"))
         outputs = output_steps(layers, arrays, own, held["outputs"], joint, by_elimination=True)
@@ -75,9 +110,29 @@ def check(path: Path) -> dict[str, Any]:
         return held
 
 
+def _cut(path: Path, held: Any, manifest: Any, text: str, arrays: Any, promise: Any) -> Cut:
+    """Return the steps of a first layer of low rank, of which the manifest states no less."""
+    before, stated, whole = path.with_name(FIRST_PASS + path.name), manifest["factored"], held["factored"]
+    check(before)
+    _, first, first_text, first_arrays, _ = read(before)
+    for key in ("target", "language", "profile", "sine"):
+        same(f"first kernel: {key}", first[key], manifest[key])
+    same("first kernel: centre", first["window"]["centre"], manifest["window"]["centre"])
+    keys = [{*stated}, {*stated["cut"]}, stated["rank"]]
+    same("manifest: what it states of the rank", keys, [*STATED, first["output"]["channels"]])
+    name = network_of(text)[0][0]["weight"]
+    same("program that was cut: its matrix", [*whole["parameters"]], [name])
+    floats = {key: array.astype("<f4") for key, array in arrays.items()} | parameters_of(whole, [])
+    same("digest of the program that was cut", digest_of(whole["program"], floats), stated["program"])
+    weight = floats[name].astype(np.float64)
+    cut = cut_steps((whole["program"], first_text, text), (weight, first_arrays, arrays), promise)
+    _at_least("manifest: cut", [stated["cut"][key] for key in ("first_layer", "of")], [cut.left, cut.largest])
+    return cut
+
+
 def network_of(text: str) -> tuple[list[dict[str, Any]], tuple[Any, Any, Any]]:
     """Return the layers of a network, first to last, and (low, high, parts) of its windows."""
-    nodes = {int(m[1]): m for m in map(NODE.fullmatch, text.splitlines()) if m}
+    nodes = nodes_of(text)
 
     def arguments(m: Any) -> list[Any]:
         return [nodes[int(i)] for i in re.findall(r"%(\d+)", m[3])]
@@ -113,6 +168,52 @@ def network_of(text: str) -> tuple[list[dict[str, Any]], tuple[Any, Any, Any]]:
     return layers, (low, high, parts if len(parts) > 1 else None)
 
 
+def cut_steps(texts: tuple[str, str, str], held: tuple[Any, Any, Any], promise: Any) -> Cut:
+    """Return what the sums of a first layer of low rank are, of the program that was cut and both kernels'.
+
+    `held`: its matrix W, and the arrays of both. Formula: FAC-7.
+    """
+    (whole, before, after), (weight, first_arrays, arrays) = texts, held
+    lines = [[x for x in text.splitlines() if not OF_INPUTS.match(x)] for text in (whole, after)]
+    same("program that was cut: what it does with the first layer", *lines)
+    layers, (low, high, parts) = network_of(whole)
+    same("program that was cut: layers", layers, network_of(after)[0])
+    names = [layer["weight"] for layer in layers]
+    same("program that was cut: layers with the first one's matrix", names.count(names[0]), 1)
+    (rows, columns, border), images = inputs_of(whole)
+    same("first kernel: window and images", inputs_of(before), ((1, columns, border), images))
+    same("first kernel: operations", [m[2] for m in nodes_of(before)], ["input", "affine"])
+    first, box = network_of(before)
+    same("first kernel: a bias", "bias" in first[0], False)
+    horizontal, nothing = arrays_of(first[0], first_arrays)
+    rank, bias = len(horizontal), arrays_of(layers[0], arrays)[1]
+    taps, between = inputs_of(after)
+    same("second kernel: window", taps, (rows, 1, border))
+    names_between, name = [image[0] for image in between], FIRST_PASS[:-1]
+    named = names_between in ([name], [f"{name}_{n}" for n in range(len(between))])
+    same("second kernel: images are the first one's result", named, True)
+    vertical = arrays[names[0]].reshape(-1, rank)
+    product, magnitude = (
+        (a @ b).reshape(weight.shape)
+        for a, b in ((vertical, horizontal), (np.abs(vertical), np.abs(horizontal)))
+    )
+    # float64 rounds the sums of R products, and the difference.
+    off = np.abs(weight - product) + (rank + 2) * 2.0**-52 * (magnitude + np.abs(weight))
+    largest = np.maximum(-low, high)
+    _, (own,) = layer_steps(first, box, first_arrays, promise)
+    error = own + TINY
+    _, least, most = _sum(horizontal, nothing, *box)
+    ends = [np.tile(end, rows) for end in (least - error, most + error)]
+    stated = ends_of_window(after)
+    inside = bool((stated[0] <= ends[0]).all() and (ends[1] <= stated[1]).all())
+    same("second kernel: its images hold what the first one writes", inside, True)
+    window = *ends, [*np.arange(rows * rank).reshape(rows, rank)] if rows > 1 else None
+    _, least, most = _sum(weight, bias, low, high, parts)
+    passed, left = np.abs(arrays[names[0]]) @ np.tile(error, rows), off @ largest
+    most_of_all = float((np.abs(weight) @ largest).max())
+    return Cut(window, passed + left, least, most, float(left.max()), most_of_all)
+
+
 def arrays_of(layer: Any, arrays: Any) -> tuple[Any, Any]:
     """Return W and b of a layer."""
     weight = arrays[layer["weight"]]
@@ -126,36 +227,42 @@ def joint_steps(layers: Any, choices: Any, tables: Tables) -> list[list[float]]:
     return [tables.steps(np.array(t, np.float64), scale * np.array(s, np.float64)) for t, s in pairs]
 
 
-def layer_steps(layers: Any, box: Any, arrays: Any, promise: Any, first: Any = None) -> tuple[Any, Any]:
+def layer_steps(
+    layers: Any, box: Any, arrays: Any, promise: Any, first: Any = None, cut: Cut | None = None
+) -> tuple[Any, Any]:
     """Return the step of each layer, and what it adds to its numbers' errors (m,).
 
     `first`: spectra from which the first layer's sums are, and the bound of |s e|, s some scalings (m,).
+    `cut`: how its numbers come from another kernel.
     """
-    (low, high, parts), steps, every = box, list[dict[str, Any]](), []
+    (low, high, parts), steps, every = cut.window if cut else box, list[dict[str, Any]](), []
     for layer in layers:
         (weight, bias), scale = arrays_of(layer, arrays), abs(layer["scale"] or 1.0)
         own, least, most = _sum(weight, bias, low - TINY, high + TINY, parts)
         largest = np.maximum(-low, high)
         own = own + TINY * (np.abs(weight).sum(axis=1) + largest.sum() + 4 * (len(low) + 1))
-        sizes, more = np.abs(weight) @ (largest + TINY) + np.abs(bias), 0.0
+        sizes, more, passed = np.abs(weight) @ (largest + TINY) + np.abs(bias), 0.0, 0.0
         slack = 2.0**-40 * sizes
         if first:
             (tables, joint, after), first = first, None
             more = joint / (scale * after)
             own = tables.last(sizes, more)
             sizes = tables.most() + 2 * (sizes + more)
-        ends = np.stack([least, most]) + np.outer([-1, 1], own + more + slack)
+        if cut:
+            passed, least, most, cut = cut.passed, cut.least, cut.most, None
+        ends = np.stack([least, most]) + np.outer([-1, 1], own + more + passed + slack)
         reach = np.abs(ends).max(axis=0)
         if layer["scale"] is not None:
             rounded = U * scale * reach + 2 * TINY
             ends = np.sort(layer["scale"] * ends, axis=0) + np.outer([-1, 1], rounded)
-            own, reach = scale * own + rounded, scale * reach
+            own, passed, reach = scale * own + rounded, scale * passed, scale * reach
         size, argument = sizes.max() * max(scale, 1.0) * (1 + 2.0**-10), reach.max() * (1 + 2.0**-20)
         sine = layer["end"] == "sin"
         if not size < 3.4e38 or (sine and not argument <= promise.domain):
             why = f"numbers up to {size:.3g}, arguments up to {argument:.6g} of a sine"
             raise Refused(f"layer {len(steps)}: {why}")
-        errors = (own + (promise.error if sine else 0.0) + (2 * TINY if layer["end"] else 0.0)) * WIDER
+        own_end = (promise.error if sine else 0.0) + (2 * TINY if layer["end"] else 0.0)
+        errors = (own + passed + own_end) * WIDER
         step = {"node": layer["node"], "size_bound": up(size), "argument_bound": up(argument)}
         bounds = {"rounding_bound": [*map(up, own * WIDER)], "error_bound": [*map(up, errors)]}
         steps.append({**step, **bounds})
@@ -211,9 +318,10 @@ def output_steps(
         same(f"{name}: sizes of scalings", [s.shape for s in scales], [e.shape for e in own[:-1]])
         if not all(np.isfinite(scale).all() and (scale > 0).all() for scale in scales):
             raise Refused(f"{name}: scalings must be positive numbers")
-        row, reaches = matrices[-1][choice["output"]], [float(own[-1][choice["output"]])]
-        norms: list[float] = []
-        short, sizes = float(np.linalg.norm(row / scales[-1])), np.abs(row)
+        reaches, norms = [float(own[-1][choice["output"]])], list[float]()
+        if scales:
+            row = matrices[-1][choice["output"]]
+            short, sizes = float(np.linalg.norm(row / scales[-1])), np.abs(row)
         for at in range(len(scales) - 1, -1, -1):
             joined = 0.0 if at else sum(more)  # which is known of all neurons together only
             by_norms = short * (float(np.linalg.norm(scales[at] * own[at])) + joined)

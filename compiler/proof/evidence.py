@@ -18,6 +18,9 @@ from ...refimpl.reading import parse_json, plain_name, read_file, stated_bytes
 FLOATS, INTEGERS = "wamnet-certificate-1", "wamnet-integers-1"
 """The forms of certificates: of networks of floats, and of integers."""
 
+FIRST_PASS = "horizontal."
+"""What the names of the files of a first layer's first kernel begin with (FAC-6)."""
+
 NODE = re.compile(r"  %(\d+) = (\w+)((?: %\d+,?)*)(?: \{(.*)\})? : \w+(?:\[(\d+)\])?")
 """A line of a program's text: number, operation, operands, attributes, length of the result."""
 
@@ -31,11 +34,14 @@ def read(path: Path) -> tuple[dict[str, Any], dict[str, Any], str, dict[str, Any
     texts = [read_file(p, "certificate") for p in (path, path.parent / "manifest.json")]
     held, manifest = (parse_json(text, "certificate", "restore it") for text in texts)
     same("schema", held["schema"], INTEGERS if held["schema"] == INTEGERS else FLOATS)
+    first = FIRST_PASS if path.name.startswith(FIRST_PASS) and "factored" in manifest else ""
+    if "factored" in manifest:
+        manifest = manifest["factored"]["horizontal"] if first else _second(manifest, held)
     files, folder = {}, manifest["weights"].get("folder", ".")
     same("manifest: folder of weights.bin is . or ..", folder in (".", ".."), True)
     for name in (plain_name(name, "manifest: name of a file", "restore it") for name in manifest["files"]):
         stated = stated_bytes(manifest, name, "manifest", "restore it")
-        place = path.parent / (folder if name == "weights.bin" else "") / name
+        place = path.parent / (folder if name == "weights.bin" else "") / f"{first}{name}"
         files[name] = read_file(place, "file", "restore it", stated=stated)
         same(f"digest of {name}", held["files"].get(name), hashlib.sha256(files[name]).hexdigest())
     kernel = [manifest["digest"], manifest["profile"]["name"]]
@@ -46,12 +52,41 @@ def read(path: Path) -> tuple[dict[str, Any], dict[str, Any], str, dict[str, Any
     same("centre of the window", held["centre"], manifest["window"]["centre"])
     raw, text = np.frombuffer(files["weights.bin"], "<f4"), str(held["program"])
     arrays = parameters_of(held, raw)
-    digest = hashlib.sha256(text.encode() + b"".join(arrays[n].tobytes() for n in sorted(arrays))).hexdigest()
+    digest = digest_of(text, arrays)
     same("digest of the program in the certificate", held["program_digest"], digest)
     same("digest of the program in the manifest", manifest["program"], digest)
     check_manifest(manifest, text, len(raw))
     same("weights: all are finite", all(np.isfinite(array).all() for array in arrays.values()), True)
     return held, manifest, text, {name: a.astype(np.float64) for name, a in arrays.items()}, raw
+
+
+def _second(manifest: Any, held: Any) -> Any:
+    """Return the manifest of the second of two kernels, whose other files are the first one's."""
+    first = manifest["factored"]["horizontal"]
+    both = hashlib.sha256(f"{first['digest']} {held['manifest_digest']}".encode()).hexdigest()
+    same("digest of both kernels", manifest["digest"], both)
+    same("the program that was cut", "factored" in held, True)
+    own = {**manifest, "digest": held["manifest_digest"]}
+    for key in ("files", "file_bytes"):
+        others = {f"{FIRST_PASS}{name}": value for name, value in first[key].items()}
+        own[key] = {n: value for n, value in manifest[key].items() if not n.startswith(FIRST_PASS)}
+        same(f"{key} of the first kernel", {**own[key], **others}, manifest[key])
+    return own
+
+
+def digest_of(text: str, arrays: Any) -> str:
+    """Return the SHA-256 of a program: of its text, and of its arrays of float32 by their names."""
+    return hashlib.sha256(text.encode() + b"".join(arrays[n].tobytes() for n in sorted(arrays))).hexdigest()
+
+
+def nodes_of(text: str) -> list[re.Match[str]]:
+    """Return the lines of a program's operations: each has its place for a number, and reads earlier ones."""
+    found = [m for m in map(NODE.fullmatch, text.splitlines()) if m]
+    for number, line in enumerate(found):
+        same("program: number of a line", int(line[1]), number)
+        given = [int(i) for i in re.findall(r"%(\d+)", line[3])]
+        same(f"program: %{number} reads earlier lines", max(given, default=-1) < number, True)
+    return found
 
 
 def parameters_of(held: Any, raw: Any) -> dict[str, Any]:
@@ -83,7 +118,8 @@ def check_manifest(manifest: Any, text: str, count: int) -> None:
     names = [manifest["target"], manifest["entry_point"], schedule["name"]]
     same("manifest: target, entry point and schedule are texts", all(isinstance(n, str) for n in names), True)
     taps, images = inputs_of(text)
-    same("manifest: window", (window["size"], window["size"], window["border"]), taps)
+    sides = [window.get(key, window["size"]) for key in ("rows", "columns")]
+    same("manifest: window", (*sides, window["border"]), taps)
     stated = [(i["name"], i["channels"], i.get("whole", False), i["low"], i["high"]) for i in given]
     same("manifest: images", stated, images)
     same("program: ranges of images", all(low <= high for *_, low, high in images), True)

@@ -22,7 +22,7 @@ from typing import Any
 
 import numpy as np
 
-from .evidence import NODE, Refused, ends_of_window, inputs_of, same
+from .evidence import Refused, ends_of_window, inputs_of, nodes_of, same
 
 Range = tuple[Any, Any, int]
 """Least and largest values of a vector's numbers, or of one, as Python's integers: of units of 2^grain."""
@@ -52,11 +52,10 @@ def ends_of(each: Range) -> list[float]:
 
 def ranges(text: str, arrays: Mapping[str, Any]) -> tuple[list[Range], dict[str, list[float]]]:
     """Return the range of each line's value, and the magnitudes of all products of each sum, added up."""
-    lines = [m for m in map(NODE.fullmatch, text.splitlines()) if m]
+    lines = nodes_of(text)
     found: list[Range] = []
     sums: dict[str, list[float]] = {}
-    for number, each in enumerate(lines):
-        same("program: number of a line", int(each[1]), number)
+    for each in lines:
         line = Line(each, lines, found)
         if line.op == "input":
             found.append(_window(text))

@@ -250,9 +250,8 @@ def products_of(program: Program) -> int:
 
 
 def bound_of(artifact: Artifact) -> float | None:
-    """Return the bound of rounding for all images; of a rank against the product of its factors."""
-    factored = artifact.manifest.get("factored")
-    output = (factored["rounding"] if factored else artifact.manifest["bound"])["output"]
+    """Return the bound for all images."""
+    output = artifact.manifest["bound"]["output"]
     return max(output) if output else None
 
 

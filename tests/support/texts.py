@@ -1,21 +1,22 @@
 """Kernels' texts for the tests of their reader: written, changed in a place, and with planted faults."""
 
-import numpy as np
+import json
+
 import text_faults
 from kit import untrained
 
 from wamnet.compiler import artifact
 from wamnet.compiler.compile import compile_plan, compile_program
 from wamnet.compiler.core.lower import lower
-from wamnet.compiler.proof.evidence import read
+from wamnet.compiler.proof.evidence import FIRST_PASS, read
 from wamnet.compiler.targets import language_named
 from wamnet.compiler.variants import plan_model
 
 NAME = artifact.CERTIFICATE_NAME
 
 
-def model(size=3, border="zero", activation="sine", seed=5):
-    return untrained((6, 5), size=size, border=border, omegas=(1.0, 3.0), seed=seed, activation=activation)
+def model(size=3, border="zero", activation="sine", seed=5, omegas=(1.0, 3.0)):
+    return untrained((6, 5), size=size, border=border, omegas=omegas, seed=seed, activation=activation)
 
 
 def kernel(folder, target, schedule="plain", **kwargs):
@@ -33,10 +34,35 @@ def planned(folder, target, schedule="plain", variant="whole8", profile="ieee", 
 
 def parts(path):
     """Return the text of a kernel, its certificate, manifest and weights."""
-    held, manifest, *_ = read(path)
+    held, manifest, _, _, weights = read(path)
     (name,) = (name for name in manifest["files"] if name != "weights.bin")
-    weights = np.frombuffer((path.parent / "weights.bin").read_bytes(), "<f4")
-    return (path.parent / name).read_text(), held, manifest, weights
+    first = FIRST_PASS if path.name.startswith(FIRST_PASS) else ""
+    return (path.parent / f"{first}{name}").read_text(), held, manifest, weights
+
+
+def certificate_of(path):
+    return json.loads(path.read_text())
+
+
+def leaves(node, under=False, place=()):
+    """Return the places of all numbers under keys that hold `bound`."""
+    if isinstance(node, dict):
+        return [
+            p for key, value in node.items() for p in leaves(value, under or "bound" in key, (*place, key))
+        ]
+    if isinstance(node, list):
+        return [p for i, value in enumerate(node) for p in leaves(value, under, (*place, i))]
+    return [place] if under and type(node) in (int, float) else []
+
+
+def put(node, place, value):
+    """Return a copy with another value at a place."""
+    copy = json.loads(json.dumps(node))
+    inner = copy
+    for key in place[:-1]:
+        inner = inner[key]
+    inner[place[-1]] = value(inner[place[-1]])
+    return copy
 
 
 def changed(given, old, new, count=1):

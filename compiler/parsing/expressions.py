@@ -11,11 +11,45 @@ import numpy as np
 from ..kernel.interface import IMAGE, RESULT, WEIGHTS
 from ..kernel.kernel import FLOAT, INT, Expr, Type, const, load, name, parts, terms, total
 from .grammar import BINARY, COMPARED, LANEWISE, PRODUCTS, SHIFTS
-from .reader import Reader, Unread
+from .reader import OtherWeights, Reader, Unread
 
 
 class Expressions(Reader):
     """Reads an expression: `_expression()`."""
+
+    def placed(self, home: str, weights: Any) -> None:
+        """Hold weights in a table of the source, or in a uniform block, against those of the file."""
+        weights = np.asarray(weights, np.float32)
+        parts, found = self.parts, {"table", "fours", "quads", "constant"} & {*self.parts}
+        if len(found) != bool(home) or ("table" in found) != (home == "inline"):
+            raise Unread("weights in another place than the manifest says")
+        if found and ("argued" in parts or "weight_texture" in self.lines):
+            raise Unread("weights in two places")
+        vectors = -(-len(weights) // 4)
+        for key, count in (("count", len(weights)), ("fours", vectors), ("quads", vectors)):
+            if int(parts.get(key, count)) != count:
+                raise OtherWeights(f"it has room for {parts[key]} weights, or vectors of 4, not {count}")
+        self._read(parts.get("table", ""))
+        numbers = []
+        while self._now():
+            numbers.append(self._expression())
+            if self._now():
+                self._take(",")
+        values = np.float32([each.value if each.op == "const" else np.nan for each in numbers])
+        if home == "inline" and values.tobytes() != weights.tobytes():
+            raise OtherWeights("weights in its table are not those of weights.bin")
+
+    def buffers(self) -> None:
+        """Note the colour buffers of a fragment shader: several for more than four channels, in order."""
+        count, buffers, cleared = -(-self.channels.get(RESULT, 1) // 4), "", ""
+        if count > 1 and self.language.texels:
+            self.results = [f"{RESULT}_{number}" for number in range(count)]
+            buffers = "".join(
+                f"layout(location = {n}) out vec4 {each};\n" for n, each in enumerate(self.results)
+            )
+            cleared = "".join(f"{each} = vec4(0.0, 0.0, 0.0, 1.0);\n" for each in self.results)
+        if (self.parts.get("buffers", ""), self.parts.get("cleared", "")) != (buffers, cleared):
+            raise Unread("other colour buffers than the result's channels fill")
 
     def _made(self, what: str, *args: Expr, value: Any = None) -> Expr:
         """Return an operation; a single value among vectors fills all lanes where the language lets it."""
@@ -240,10 +274,24 @@ class Expressions(Reader):
 
     def _postfix(self, word: str) -> Expr:
         """Read the index or the component behind a name."""
-        if word == RESULT and self.language.texels:
-            return load(RESULT, name("y"), name("x"), *self._form("[ E ]"))
+        if word in self.results and self.language.texels:
+            (channel,) = self._form("[ E ]")
+            if len(self.results) > 1:
+                if channel.op != "const" or not 0 <= channel.value < 4:
+                    raise Unread(f"a channel of {word} that is no number of one")
+                channel = const(4 * self.results.index(word) + channel.value)
+            return load(RESULT, name("y"), name("x"), channel)
         if word.startswith(IMAGE) or word == RESULT:
             return self._pixel(word, *self._form("[ E ]"))
+        if word == WEIGHTS and "quads" in self.parts:
+            index, lane = self._form("[ E ] [ E ]")
+            halves = (
+                self._made("divide", index.args[0], const(4)),
+                self._made("remainder", index.args[0], const(4)),
+            )
+            if (index, lane) != halves:
+                raise Unread("a component of a block at another index than its vector")
+            return load(WEIGHTS, index.args[0])
         if word in (WEIGHTS, "w") and self._now() == "[":
             return load(WEIGHTS, *self._form("[ E ]"), kind=self.vector if word == "w" else FLOAT)
         if word in self.scope.arrays:

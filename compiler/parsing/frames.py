@@ -61,12 +61,17 @@ OPEN: Mapping[str, str] = {
     "memory": r"(?P<memory>(?:[^\n]*(?:vec|float)2\b[^\n]*\n)+)",
     "head": r"(?P<head>",
     "launches": r"(?P<launches>.*)",
+    "argued": r"(?P<argued>)", "constant": r"(?P<constant>)",
+    "table": r"weights\[(?P<count>\d+)\] = \{\n(?P<table>[^{};]*)\};",
+    "fours": r"(?P<fours>\d+)", "quads": r"(?P<quads>\d+)",
+    "buffers": r"(?P<buffers>(?:layout\(location = \d\) out vec4 result_\d;\n)+)",
+    "cleared": r"(?P<cleared>(?:result_\d = vec4\(0\.0, 0\.0, 0\.0, 1\.0\);\n)+)",
 }  # fmt: skip
 """The open places by name; `@each LINE@` are lines, one for each image."""
 
 BLOCKS = (
     "constants", "wgsl_constants", "functions", "undefined", "images", "body", "bounded", "words", "gnu",
-    "dropped", "memory", "launches", *"(|)<>",
+    "dropped", "memory", "launches", "argued", "constant", "buffers", "cleared", *"(|)<>",
 )  # fmt: skip
 """Places that match whole lines or nothing: the newline behind the marker is not part of the pattern."""
 
@@ -105,7 +110,8 @@ def read_size(index: str, of: str, more: tuple[str, ...] = ()) -> str:
 
 ARGUMENTS = """
 @each const float *restrict IMAGE,@
-const float *restrict weights,
+@(@@argued@const float *restrict weights,
+@)@
 float *restrict result,
 int width,
 int height"""
@@ -125,8 +131,11 @@ FRAGMENT = """
 @functions@
 @each uniform sampler2D IMAGE;@
 @(@uniform sampler2D weight_texture;
+@|@layout(std140) uniform Weights { vec4 weights[@quads@]; };
 @)@
-layout(location = 0) out vec4 result;
+@<@layout(location = 0) out vec4 result;
+@|@@buffers@
+@>@
 @(@float weights(int index)
 {
 ivec2 texel = ivec2(index % 1024, index / 1024);
@@ -144,7 +153,9 @@ int width = textureSize(@first@, 0).x;
 int height = textureSize(@same_first@, 0).y;
 int @column@ = int(gl_FragCoord.x);
 int @row@ = int(gl_FragCoord.y);
-result = vec4(0.0, 0.0, 0.0, 1.0);
+@<@result = vec4(0.0, 0.0, 0.0, 1.0);
+@|@@cleared@
+@>@
 @body@
 }
 """
@@ -201,6 +212,8 @@ FRAMES: dict[str, str] = {
 @)@
 @)@
 @constants@
+@(@static const float @table@
+@)@
 @functions@
 @(@@gnu@{CLONED}
 @)@
@@ -217,7 +230,7 @@ static inline void wamnet_image({SAME})
 {{
 for (int y = 0; y < height; @advance_y@) {{
 for (int x = 0; x < width; @advance@) {{
-wamnet_pixel(@given@weights, result, width, height, x, y);
+wamnet_pixel(@given@@(@@argued@weights, @)@result, width, height, x, y);
 }}
 }}
 }}
@@ -226,7 +239,8 @@ static inline void wamnet_pixel({SAME},
 int @x@,
 int @y@)
 {{
-(void)weights;
+@(@@argued@(void)weights;
+@)@
 @body@
 }}
 #if defined(__GNUC__) && !defined(__clang__)
@@ -245,13 +259,17 @@ int @y@)
 @constants@
 @(@{OPENCL_TILE.replace("int16", "int@lanes@", 1)}
 @)@
+@(@__constant float @table@
+@)@
 @functions@
 @<@__kernel void wamnet_denoise(
 @|@@group@__kernel __attribute__((reqd_work_group_size(GROUP_WIDTH, GROUP_HEIGHT, 1)))
 void wamnet_denoise(
 @>@
 @each __global const float *restrict IMAGE,@
-__global const float *restrict weights,
+@(@@argued@__global const float *restrict weights,
+@|@__constant float *restrict weights __attribute__((max_constant_size(16 * @fours@))),
+@)@
 __global float *restrict result,
 int width,
 int height)
@@ -280,12 +298,15 @@ static __device__ inline {CLAMP}
 @|@{CUDA_VECTOR}
 @)@
 @constants@
+@(@static __device__ const float @table@
+@)@
 @functions@
 @<@@<@extern "C" __global__ void wamnet_denoise(
 @|@@group@extern "C" __global__ void __launch_bounds__(GROUP_WIDTH * GROUP_HEIGHT) wamnet_denoise(
 @>@
 @each const float *__restrict__ IMAGE,@
-const float *__restrict__ weights,
+@(@@argued@const float *__restrict__ weights,
+@)@
 float *__restrict__ result,
 int width,
 int height)
@@ -324,6 +345,8 @@ int line = (int)(blockIdx.y * blockDim.y + threadIdx.y);
 #include <metal_stdlib>
 using namespace metal;
 @constants@
+@(@constant float @table@
+@)@
 @functions@
 struct Size {{
 int width;
@@ -334,7 +357,9 @@ int tile_count;
 }};
 @<@kernel void wamnet_denoise(
 constant Size &size [[buffer(0)]],
-device const float *weights [[buffer(1)]],
+@(@@argued@device const float *weights [[buffer(1)]],
+@|@@constant@constant float *weights [[buffer(1)]],
+@)@
 device float *result [[buffer(2)]],
 @each device const float *IMAGE [[buffer(NUMBER)]],@
 @<@uint2 thread_place [[thread_position_in_grid]])
@@ -433,7 +458,9 @@ int height;
 int tile_count;
 @)@
 }};
-layout(std430, binding = 1) restrict readonly buffer Weights {{ @<@float weights@|@@vector@ w@>@[]; }};
+@<@layout(std430, binding = 1) restrict readonly buffer Weights {{ @<@float weights@|@@vector@ w@>@[]; }};
+@|@layout(std140, binding = 1) uniform Weights {{ vec4 weights[@quads@]; }};
+@>@
 layout(std430, binding = 2) restrict buffer Result {{ float result[]; }};
 @each layout(std430, binding = NUMBER) restrict readonly buffer BLOCK {{ float IMAGE[]; }};@
 @(@shared @shared@ tile[TILE_NUMBERS];
@@ -462,7 +489,8 @@ tile_count: i32,
 @)@
 }}
 $group(0) $binding(0) var<uniform> size: Size;
-$group(0) $binding(1) var<storage, read> @<@weights: array<f32>@|@w: array<@vector@>@>@;
+$group(0) $binding(1) var<@<@storage, read> @<@weights: array<f32>@|@w: array<@vector@>@>@
+@|@uniform> weights: array<vec4<f32>, @quads@>@>@;
 $group(0) $binding(2) var<storage, read_write> result: array<f32>;
 @each $group(0) $binding(NUMBER) var<storage, read> IMAGE: array<f32>;@
 @(@var<workgroup> tile: array<@shared@, TILE_NUMBERS>;

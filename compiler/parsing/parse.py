@@ -49,13 +49,17 @@ def parse(
     channels: Mapping[str, int] | None = None,
     bounded: bool = False,
     passes: Passes | None = None,
+    weights: Any = (),
 ) -> tree.Kernel:
     """Return the kernel of a source.
 
     `channels` of the images and of the result by name, where the source does not state them: of textures.
     `bounded`: it must say what an error bound rests on, where its language lets it. `passes`: what a manifest
-    says of launches.
+    says of launches. `weights`: those of the file, which a table in the source repeats.
+
+    Raises `Unread` for a text that it cannot read, and `OtherWeights` for a table of others.
     """
+    language, _, home = language.partition(":")
     if re.search(r"[^\n -~]|\?\?", source):
         raise Unread("a character beyond printable ASCII, or a trigraph")
     if language == "glsl-es" and not source.startswith("#version"):
@@ -83,8 +87,9 @@ def parse(
     ):
         raise Unread(f"a word that {language} does not have")
     parser = Parser(LANGUAGES[language], parts, dict(channels or {}))
-    parser.bounded, parser.passes = bounded, passes
+    parser.bounded, parser.passes, parser.lines = bounded, passes, lines
     try:
+        parser.placed(home, weights)
         kernel = parser.kernel()
         verify(kernel)
     except (KernelError, RecursionError) as error:
@@ -115,6 +120,7 @@ class Parser(Expressions):
         if set(re.findall(r"#undef (\w+)", parts.get("undefined", ""))) - {*known}:
             raise Unread("an #undef of what is not a constant of this source")
         self._vectors(known.get("LANES"))
+        self.buffers()
         self._read(parts.get("functions", ""))
         while self._now():
             self._function()

@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
-from ..kernel.interface import IMAGE
+from ..kernel.interface import IMAGE, RESULT
 from ..kernel.kernel import FLOAT, INT, Expr, Function, Type
 from .grammar import FUNCTION, NAME, TOKEN, Language
 
@@ -43,6 +43,10 @@ class Scope:
         self.arrays.pop(key, None)
 
 
+class OtherWeights(Exception):
+    """A source in which other weights stand than in the file beside it."""
+
+
 class Reader:
     """The tokens of a part of a source, and the scope at one of them.
 
@@ -60,6 +64,7 @@ class Reader:
         self.by_calls = self.bounded = False
         self.passes: Passes | None = None
         self.functions: dict[str, Function] = {}
+        self.results, self.lines = [RESULT], ""
         self.tokens: list[tuple[str, str]] = []
         self.at, self.depth, self.operator, self.pointer = 0, 0, "", ""
 

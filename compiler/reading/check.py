@@ -30,11 +30,11 @@ from ..kernel.kernel import (
 )
 from ..parsing.grammar import LANGUAGES
 from ..parsing.parse import parse
-from ..parsing.reader import Passes
-from ..proof.evidence import NODE, Refused, read, same
+from ..parsing.reader import OtherWeights, Passes
+from ..proof.evidence import FIRST_PASS, Refused, nodes_of, read, same
 from .claim import Claim
 from .lanes import Unread, Wrong, group_lanes, lanes_for, tile_lanes
-from .languages import TITLES, is_read
+from .languages import TITLES, is_read, language_of
 from .limits import limited
 from .spectra import Tiles
 from .trial import Trial
@@ -56,6 +56,7 @@ KEYS = {
 
 AGAINST = re.compile(
     r"float64 reference, same float32 weights and images|reference in integers, the same bits"
+    r"|float64 reference of the program that was cut"
 )
 """What a certified bound is against."""
 
@@ -70,20 +71,34 @@ def check_text(path: Path, source: Path | None = None) -> dict[str, int]:
     constructs that this reader does not know, or in a language that it does not read.
     """
     held, manifest, _, _, weights = read(path)
+    before = path.with_name(FIRST_PASS + path.name)
+    first = check_text(before) if "factored" in held else {}
     sources = [name for name in manifest["files"] if name != "weights.bin"]
     if len(sources) != 1:
         raise Unread(f"kernels of {len(sources)} texts")
     if not is_read(manifest):
         kind = f"schedule {manifest['schedule']['name']}, profile {manifest['profile']['name']}"
         raise Unread(f"texts of target {manifest['target']} with {kind}")
-    own = read_file(path.parent / sources[0], "kernel", "restore it")
+    prefix = FIRST_PASS if path.name.startswith(FIRST_PASS) else ""
+    own = read_file(path.parent / f"{prefix}{sources[0]}", "kernel", "restore it")
     try:
         check_facts(manifest, held, own + weights.tobytes())
     except MEANINGLESS as error:
         raise Refused(f"manifest: a fact is of another form ({error})") from error
-    text = read_file(source, "kernel", "name a text in the kernel's language") if source else own
-    found: dict[str, int] = limited(run_text, text.decode(errors="replace"), held, manifest, weights)
-    return found
+    given = read_file(source, "kernel", "name a text in the kernel's language") if source else own
+    text = given.decode(errors="replace")
+    if manifest["target"] == "c" and manifest["entry_point"].startswith("wamnet_horizontal_"):
+        text = common_names(text)
+    found: dict[str, int] = limited(run_text, text, held, manifest, weights)
+    return {"sums": found["sums"] + first.get("sums", 0), "lanes": found["lanes"]}
+
+
+def common_names(source: str) -> str:
+    """Return the first of a denoiser's two headers of C with the names that its kernel has alone (KER-16)."""
+    if re.search(r"\bwamnet_(?!horizontal_)[a-z]|WAMNET_DENOISE_H", source):
+        raise Unread("names of the second kernel in the first one")
+    source = source.replace("WAMNET_HORIZONTAL_H", "WAMNET_DENOISE_H")
+    return re.sub(r"\bwamnet_horizontal_", "wamnet_", source)
 
 
 def run_text(source: str, held: Any, manifest: Any, weights: Any) -> dict[str, int]:
@@ -105,13 +120,13 @@ def run_text(source: str, held: Any, manifest: Any, weights: Any) -> dict[str, i
             lanes = lanes_for((reach + pixels - 1, reach), pixels)
         claim = Claim(held, manifest, weights, lanes, pixels, group[0] if group else 1, tiles, slots)
         lanes.channels = max(int(manifest["output"]["channels"]), *(n for _, n in claim.images))
-        kernel = parsed(source, manifest)
+        kernel = parsed(source, manifest, weights)
         check_interface(kernel, claim, manifest)
         for each in kernel.functions:
             end = () if each.result is None else (Store(RESULT, (), each.result),)
             check_used((*each.body, *end), {RESULT, *(key for key, _ in each.takes)})
         check_used(kernel.body, {RESULT})
-        trial = Trial(kernel, claim, LANGUAGES[manifest["target"]].texels)
+        trial = Trial(kernel, claim, LANGUAGES[language_of(manifest)].texels)
         trial.body(kernel.body)
         trial.ended()
         bodies = (kernel.body, *(each.body for each in kernel.functions))
@@ -120,7 +135,7 @@ def run_text(source: str, held: Any, manifest: Any, weights: Any) -> dict[str, i
         shared = 4 * sum(memory.size for memory in trial.shared)
         if shared != schedule.get("shared_bytes", 0):
             raise Wrong(f"its groups share {shared} bytes, not what its manifest says")
-    except Wrong as error:
+    except (Wrong, OtherWeights) as error:
         raise Refused(f"source: {error}") from error
     except RecursionError as error:
         raise Unread("expressions, or blocks, so deep in each other") from error
@@ -187,7 +202,7 @@ def check_items(manifest: Any, tiles: bool) -> None:
     items = [schedule.get("pixels", 1), schedule.get("rows", 1), *schedule.get("group", (1, 1))]
     if len(items) != 4 or not all(type(n) is int and n > 0 for n in items):
         raise Wrong("its manifest has work items of no size")
-    target, name, count = manifest["target"], schedule["name"], manifest["weights"]["count"]
+    target, name, count = language_of(manifest), schedule["name"], manifest["weights"]["count"]
     family, _, pixels = name.partition(":")
     right = (name == "plain") <= (items == [1] * 4) and name.startswith("group") == ("group" in schedule)
     in_passes = {key in schedule for key in ("launches", "memory", "items", "entries", "arrays")}
@@ -221,17 +236,18 @@ def check_facts(manifest: Any, held: Any, kernel: bytes) -> None:
     ]
     words += [one["encoding"] for one in (*manifest["images"], manifest["output"])]
     words += [manifest["weights"]["order"]]
+    words += [manifest["factored"]["cut"]["against"]] if "factored" in held else []
     same("manifest: descriptions are strings", {type(word) for word in words}, {str})
     same("manifest: private_bytes is a count", type(manifest["private_bytes"]) is int, True)
     against = held["bound"]["against"]
     same("manifest: what its bound is against", manifest["bound"]["against"], against)
     same("bound: against a reference", bool(AGAINST.fullmatch(against)), True)
     text = str(held["program"])
-    nodes = {m[1]: m for m in map(NODE.match, text.splitlines()) if m}
-    own = [int(nodes[n][5] or 1) for n in re.findall(r"(?m)^  output \w+ = %(\d+)$", text)]
+    nodes = nodes_of(text)
+    own = [int(nodes[int(n)][5] or 1) for n in re.findall(r"(?m)^  output \w+ = %(\d+)$", text)]
     same("manifest: channels of the output", [manifest["output"]["channels"]], own)
     sines = manifest["sine_arguments"]
-    same("manifest: sine_arguments", len(sines), sum(m[2] == "sin" for m in nodes.values()))
+    same("manifest: sine_arguments", len(sines), sum(m[2] == "sin" for m in nodes))
     most = manifest["sine"]["domain"] if sines else 0
     right = all(-most <= low <= high <= most for low, high in sines)
     same("manifest: sine_arguments are ranges in the sine's domain", right, True)
@@ -253,13 +269,13 @@ def check_facts(manifest: Any, held: Any, kernel: bytes) -> None:
     same("manifest: layout of the weights", {name: layout.get(name) for name in stated}, stated)
 
 
-def parsed(source: str, manifest: Any) -> Kernel:
+def parsed(source: str, manifest: Any, weights: Any) -> Kernel:
     """Return the kernel that a text is, of the images that a manifest names."""
     output = manifest["output"]
     channels = {f"{IMAGE}{image['name']}": image["channels"] for image in manifest["images"]}
     bounded = any(manifest["bound"]["output"])
     channels[RESULT] = output["channels"]
-    return parse(source, manifest["target"], channels, bounded, passes_of(manifest["schedule"]))
+    return parse(source, manifest["target"], channels, bounded, passes_of(manifest["schedule"]), weights)
 
 
 def check_interface(kernel: Kernel, claim: Claim, manifest: Any) -> None:
@@ -274,7 +290,7 @@ def check_interface(kernel: Kernel, claim: Claim, manifest: Any) -> None:
         raise Wrong(f"its groups are not of {' x '.join(map(str, group or ['no']))} items")
     stated = [schedule.get(key, ()) for key in ("arrays", "entries")]
     # In GLSL the program is compiled for each launch, in other languages each is an entry point.
-    point, of_each = manifest["entry_point"], "STAGE" not in LANGUAGES[manifest["target"]].launch
+    point, of_each = manifest["entry_point"], "STAGE" not in LANGUAGES[language_of(manifest)].launch
     for number, (launch, arrays, entry) in enumerate(zip(kernel.launches, *stated, strict=True)):
         every = walk(launch.body)
         used = {s.array for s in every if isinstance(s, Store)}

@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..proof.evidence import INTEGERS, NODE, inputs_of, parameters_of, places
+from ..proof.evidence import INTEGERS, inputs_of, nodes_of, parameters_of, places
 from ..proof.sine_checker import sine
 from .field import P, Words, drawn, hashed, literal
 from .integers import Ranges, Stored, filled
@@ -78,6 +78,8 @@ class Claim:
         self.made: set[int] = set()
         self.window, images = inputs_of(self.text)
         self.images = [(name, channels) for name, channels, *_ in images]
+        # Those of the second kernel of a first layer of low rank are one (KER-15).
+        self.groups = [("horizontal", sum(n for _, n in self.images))] if "factored" in held else self.images
         self.centre = int(manifest["window"]["centre"])
         own = (lanes.x < lanes.known[1]) & (lanes.y < lanes.known[3])
         self.fold = Fold(own | (lanes.inside is not None), slots)  # all items of a group compute sums
@@ -124,7 +126,8 @@ class Claim:
 
     def _input(self) -> Term:
         """Return the windows (1, pixels * n) of all pixels, folded: tap by tap, all images' channels."""
-        rows, columns = (np.arange(size) - self.centre for size in self.window[:2])
+        # A window along one axis has one tap along the other.
+        rows, columns = (np.arange(size) - self.centre * (size > 1) for size in self.window[:2])
         every = columns + self.stride * np.arange(self.pixels)[:, None]
         across = np.unique(every)
         read = patches(self.lanes, self.fold, self.images, (across, rows), self.window[2])
@@ -136,7 +139,7 @@ class Claim:
     def _outputs(self) -> Term:
         """Return the outputs of all pixels, and make a table of their sums."""
         values: dict[str, Any] = {}
-        for m in filter(None, map(NODE.fullmatch, self.text.splitlines())):
+        for m in nodes_of(self.text):
             number, op, named = m[1], m[2], dict(p.split("=") for p in (m[4] or "").split(", ") if p)
             given = [values[i] for i in re.findall(r"%(\d+)", m[3])]
             kind = m[0].rpartition(" : ")[2].partition("[")[0]
@@ -206,13 +209,13 @@ class Claim:
 
     def _parts(self, n: int) -> list[tuple[str, NDArray[np.intp]]]:
         """Return the partial sums of a window: of each image and row of taps."""
-        counts = [channels for _, channels in self.images]
+        counts = [channels for _, channels in self.groups]
         owner = np.tile(np.repeat(np.arange(len(counts)), counts), n // sum(counts))
         rows = self.window[0]
         row = np.repeat(np.arange(rows), n // rows)
         return [
             (f"image {name}, row {y}", np.flatnonzero((owner == i) & (row == y)))
-            for i, (name, _) in enumerate(self.images)
+            for i, (name, _) in enumerate(self.groups)
             for y in range(rows)
         ]
 

@@ -7,11 +7,12 @@ from typing import Any
 
 TITLES: Mapping[str, str] = {
     "opencl": "OpenCL C", "c": "C99", "opengl": "GLSL 3.30", "glsl-es": "GLSL ES 3.00",
-    "glsl-vulkan": "GLSL 4.50", "wgsl": "WGSL", "metal": "Metal", "cuda": "CUDA C",
+    "glsl-vulkan": "GLSL 4.50", "glsl-compute": "GLSL 4.30", "wgsl": "WGSL", "metal": "Metal",
+    "cuda": "CUDA C",
 }  # fmt: skip
 """What a language's name in manifests begins with."""
 
-BUFFERS = dict.fromkeys(("glsl-vulkan", "wgsl", "cuda", "metal"), ("group", "tile"))
+BUFFERS = dict.fromkeys(("glsl-vulkan", "glsl-compute", "wgsl", "cuda", "metal"), ("group", "tile"))
 """Languages of which work groups and register tiles are read, and of floats FFT passes."""
 
 OF_FLOATS: Mapping[str, tuple[str, ...]] = {
@@ -22,7 +23,7 @@ OF_FLOATS: Mapping[str, tuple[str, ...]] = {
 
 OF_INTEGERS: Mapping[str, tuple[str, ...]] = {
     **BUFFERS, "opencl": ("tile", "vector", "group", "dot"), "c": ("tile", "dot"),
-    "glsl-vulkan": ("group",), "wgsl": ("group",),
+    **dict.fromkeys(("glsl-vulkan", "glsl-compute", "wgsl"), ("group",)),
 }  # fmt: skip
 """The same of networks of integers."""
 
@@ -30,11 +31,17 @@ READ_PROFILE = "ieee"
 """The profile whose sines are read, of every degree."""
 
 
+def language_of(manifest: Mapping[str, Any]) -> str:
+    """Return the language of a kernel: its target without the place of the weights."""
+    return str(manifest["target"]).partition(":")[0]
+
+
 def is_read(manifest: Mapping[str, Any]) -> bool:
     """Return whether the text of a kernel is of a kind that is read, by its manifest (TXT-7)."""
-    target, schedule = manifest["target"], manifest["schedule"]["name"]
+    target, schedule = language_of(manifest), manifest["schedule"]["name"]
     known_sines = not manifest["sine_arguments"] or manifest["profile"]["name"].startswith(READ_PROFILE)
-    if target not in TITLES or not known_sines:
+    home = manifest["target"].partition(":")[2]
+    if target not in TITLES or not known_sines or home not in ("", "inline", "uniform"):
         return False
     begins = (OF_FLOATS if any(manifest["bound"]["output"]) else OF_INTEGERS).get(target, ())
     return bool(schedule == "plain" or schedule.startswith(begins))

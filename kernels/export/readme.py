@@ -11,7 +11,7 @@ from pathlib import Path
 from string import Formatter
 from typing import Any
 
-from ...compiler.artifact import Artifact, schedule_text
+from ...compiler.artifact import FIRST_PASS, Artifact, schedule_text
 from ...compiler.core.lower import OWN_NUMBERS
 from ...compiler.kernel.interface import PATH, SCENE_NUMBERS, WEIGHTS
 from ...compiler.languages.c import whole
@@ -160,11 +160,13 @@ def _proof(facts: Mapping[str, Any], denoiser: Artifact | None) -> str:
     if denoiser.certificate is None:
         return said("uncertified", reason=denoiser.plan.unproven) + paths
     bound, source = max(denoiser.certificate["bound"]["output"]), denoiser.source_name
+    other = f" and `denoise/{FIRST_PASS}{denoiser.before.source_name}`" if denoiser.before else ""
     size = f"a bound of {bound:g} for all images" if bound else "that no operation rounds"
     made = [f"`{name}`" for name in facts["kernels"][-1]["files"] if name != f"denoise/{source}"]
     besides = f" {', '.join(made)}: translated from it, and not read." if made else ""
     kind = {"schedule": denoiser.manifest["schedule"]["name"], "profile": denoiser.profile}
-    read = said("read" if is_read(denoiser.manifest) else "unread", source=source, besides=besides, **kind)
+    known = all(is_read(kernel.manifest) for kernel in denoiser.kernels)
+    read = said("read" if known else "unread", source=source, other=other, besides=besides, **kind)
     return f"{said('certificate', certificate=facts['certificate'], size=size)}\n{read}{paths}"
 
 

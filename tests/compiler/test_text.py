@@ -109,6 +109,48 @@ def test_constants_are_weights_of_their_schedule_only(of, stated, tmp_path):
         run_text(text, held, manifest, weights)
 
 
+PLACES = [f"{name}:inline" for name in ("c", "cuda", "metal", "opencl")]
+PLACES += [f"{name}:uniform" for name in ("metal", "opencl", "wgsl", "opengl", "glsl-es", "glsl-vulkan")]
+"""Targets whose weights are in a table of the source, or in a uniform block."""
+
+
+@pytest.mark.parametrize("target", PLACES)
+def test_weights_in_tables_and_blocks_are_those_of_the_file(target, tmp_path):
+    """TXT-7, and the same text under another place is refused."""
+    path = kernel(tmp_path, target)
+    assert check_text(path)["sums"] == 9
+    source, held, manifest, weights = parts(path)
+    for other in ("", ":inline", ":uniform"):
+        named = manifest["target"].partition(":")[0] + other
+        if named != target:
+            with pytest.raises((Refused, Unread), match=r"another place|nothing defines"):
+                run_text(source, held, {**manifest, "target": named}, weights)
+
+
+@pytest.mark.parametrize(
+    ("target", "old", "new", "why"),
+    [
+        ("c:inline", "weights[383]", "weights[384]", "has room for 384"),
+        ("c:inline", "0.325407952f}", "0.325407952f, 0.0f}", "not those of weights.bin"),
+        ("c:inline", "0.325407952f}", "0.325407982f}", "not those of weights.bin"),
+        ("opencl:inline", "0.325407952f}", "(-0.325407952f)}", "not those of weights.bin"),
+        ("cuda:inline", ", 0.325407952f}", "}", "not those of weights.bin"),
+        ("metal:inline", "0.325407952f}", "x}", "not those of weights.bin"),
+        ("c:inline", "float *restrict result,", "float *restrict weights,", "frame"),
+        ("c:inline", "image_normal,", "image_normal,\nconst float *restrict weights,", "frame|two places"),
+        ("opencl:uniform", "16 * 96", "16 * 95", "has room for 95"),
+        ("wgsl:uniform", "vec4<f32>, 96>", "vec4<f32>, 97>", "has room for 97"),
+        ("wgsl:uniform", "[(324 + j) % 4]", "[(325 + j) % 4]", "another index"),
+        ("glsl-vulkan:uniform", "[(324 + j) / 4]", "[(324 + j) / 3]", "another index"),
+        ("glsl-es:uniform", "[(324 + j) / 4][(324 + j) % 4]", "[324 + j]", r"\S"),
+        ("opengl:uniform", "uniform sampler2D image_color;", "uniform sampler2D weight_texture;", r"\S"),
+    ],
+)  # fmt: skip
+def test_wrong_tables_and_blocks_are_refused(target, old, new, why, tmp_path):
+    with pytest.raises((Refused, Unread), match=why):
+        run_text(*changed(parts(kernel(tmp_path, target)), old, new))
+
+
 @pytest.mark.parametrize("target", ["c", "cuda", "opencl", "opengl", "wgsl"])
 @pytest.mark.parametrize("size", [3, 4])
 def test_texts_of_integers_compute_what_is_certified(target, size, tmp_path):

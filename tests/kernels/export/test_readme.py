@@ -111,12 +111,10 @@ def test_it_says_which_file_is_a_translation_that_nobody_reads():
 @pytest.mark.parametrize(
     ("target", "options", "said"),
     [
-        ("c", {"variant": "rank2"}, "There is no certificate: it is two kernels, one after the other"),
+        ("c", {"variant": "rank2"}, "It reads `denoise/denoise.h` and `denoise/horizontal.denoise.h` too"),
         ("c", {"profile": "native"}, "There is no certificate: nothing is promised of the sine"),
         (ONNX, {}, "There is no certificate: a runtime makes kernels of its own"),
         ("cuda", {"profile": "native"}, "(schedule group:4, profile native) it does not know."),
-        ("c", {"weights": "inline"}, "(schedule plain, profile ieee) it does not know."),
-        ("opencl", {"weights": "uniform"}, "whose kind (schedule plain, profile ieee) it does not know."),
     ],
 )
 def test_it_says_what_has_no_certificate_or_is_not_read(target, options, said):

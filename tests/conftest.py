@@ -11,12 +11,14 @@
 3. The user's cache folder is never touched: tests have one of their own, which their commands inherit. So
    they do the executor NumPy instead of `auto`: results do not depend on the machine.
    Measurements do not rest between runs [`no_rests`].
-4. `golden` compares generated text with a file under tests/golden; only `--update-golden` writes one.
+4. `golden` compares generated text with a file under tests/golden, or with its digest where another text or
+   the shelf shows the language; only `--update-golden` writes one.
 5. Processes stay small (tests/support/workers.py, tests/support/apart.py).
 6. `--quick` runs what needs NumPy only (tests/support/quick.py), `--nightly` what takes long as well
    (tests/support/tiers.py). `--shuffle SEED` runs the tests in another order, the same for all workers.
 """
 
+import hashlib
 import os
 import signal
 from collections.abc import Callable, Iterator
@@ -245,18 +247,28 @@ def own_cache(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
 
 @pytest.fixture
 def golden(pytestconfig: pytest.Config) -> Callable[[str, str], None]:
-    """Give `check(name, text)`: the text must equal tests/golden/<name> to the byte; a missing file fails."""
+    """Give `check(name, text)`: the text must equal tests/golden/<name> to the byte; a missing file fails.
+
+    Where <name>.sha256 is there instead, as `sha256sum` writes it, the digest must be equal, and a text that
+    differs, or --update-golden, is written to out/golden: compare it with that of the last commit.
+    """
     folder = Path(__file__).parent / "golden"
 
     def check(name: str, text: str) -> None:
-        path = folder / name
-        if pytestconfig.getoption("--update-golden"):
-            path.parent.mkdir(parents=True, exist_ok=True)
-            path.write_bytes(text.encode())
+        path, data = folder / name, text.encode()
+        if digest := (folder / f"{name}.sha256").exists():
+            path, data = folder / f"{name}.sha256", f"{hashlib.sha256(data).hexdigest()}  {name}\n".encode()
+        update, old = pytestconfig.getoption("--update-golden"), path.read_bytes() if path.exists() else None
+        if digest and (update or old != data):
+            out = Path(__file__).parents[1] / "out/golden"
+            out.mkdir(parents=True, exist_ok=True)
+            (out / name).write_text(text, encoding="utf-8", newline="\n")
+        if update:
+            path.write_bytes(old := data)
         way_out = (
             "run pytest --update-golden, read the difference with git diff, and commit it if it is meant"
         )
-        assert path.exists(), f"tests/golden/{name} does not exist; {way_out}"
-        assert text == path.read_bytes().decode(), f"the text is not that of tests/golden/{name}; {way_out}"
+        assert old is not None, f"tests/golden/{name} does not exist; {way_out}"
+        assert old == data, f"the text is not that of tests/golden/{path.name}; {way_out}"
 
     return check

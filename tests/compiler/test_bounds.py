@@ -1,7 +1,5 @@
 """The rules of error bounds, one by one, against exact rational arithmetic; then whole programs."""
 
-from __future__ import annotations
-
 from fractions import Fraction
 
 import numpy as np

@@ -1,7 +1,5 @@
 """From a program to an artifact: generated text, manifest, bound, refusals, files."""
 
-from __future__ import annotations
-
 import json
 import re
 from concurrent.futures import ThreadPoolExecutor

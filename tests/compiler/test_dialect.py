@@ -1,7 +1,5 @@
 """Dialects: every operation has its words, every constant names one float32."""
 
-from __future__ import annotations
-
 import subprocess
 import sys
 

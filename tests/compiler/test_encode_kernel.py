@@ -1,7 +1,5 @@
 """Encoding kernels: the traced reference, its bound, generated text, manifest, refusals."""
 
-from __future__ import annotations
-
 import json
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Tests of first layers in two passes: programs, bounds, what a manifest says, refusals."""
 
-from __future__ import annotations
-
 import json
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Transforms, sums from spectra, and their bound: against numpy.fft and direct sums."""
 
-from __future__ import annotations
-
 import re
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Trees of bounding boxes: the list's bits for any rays and primitives (PTK-19, IR-18, SHP-4)."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from itertools import pairwise
 

@@ -5,8 +5,6 @@ at the corners of pictures of just below 2^31 numbers. No step of it may leave 3
 meet. What reads textures has no such subscript; its coordinates are those of the texture.
 """
 
-from __future__ import annotations
-
 import re
 from itertools import product
 

@@ -8,8 +8,6 @@
 3. What reads and writes textures has no subscripts; its coordinates are those of the texture.
 """
 
-from __future__ import annotations
-
 import re
 from itertools import product
 

@@ -1,7 +1,5 @@
 """Certificates of integers: what the checker accepts and refuses."""
 
-from __future__ import annotations
-
 import ast
 import inspect
 import itertools

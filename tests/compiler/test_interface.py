@@ -1,7 +1,5 @@
 """What a kernel is bound to is said once [KER-23, interface.py]: sources and exports say the same."""
 
-from __future__ import annotations
-
 import re
 
 import pytest

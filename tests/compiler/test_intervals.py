@@ -1,7 +1,5 @@
 """The images of operations hold what the operations compute, and no more where they are monotone."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from hypothesis import assume, given, settings

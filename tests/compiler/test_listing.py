@@ -1,7 +1,5 @@
 """Listings: each line of a kernel knows the line of the reference that it came from, and costs it nothing."""
 
-from __future__ import annotations
-
 import inspect
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """Loops over the rows of tables: what a fold becomes, what is in a body, and that nothing else changes."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """Paths as programs: the reference's bits, and nothing of what a scene lacks."""
 
-from __future__ import annotations
-
 from collections import Counter
 from dataclasses import replace
 

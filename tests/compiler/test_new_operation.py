@@ -1,7 +1,5 @@
 """How an operation is added: a row, a rule for its bound, and its words in the languages."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from wamnet.compiler.compile import compile_program

@@ -1,7 +1,5 @@
 """Path kernels: generated text, manifest, refusals."""
 
-from __future__ import annotations
-
 import json
 import re
 from dataclasses import replace

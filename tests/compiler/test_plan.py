@@ -1,7 +1,5 @@
 """A plan: what it computes once, and the reference and the bound at given images."""
 
-from __future__ import annotations
-
 import pickle
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Ranges of what executors may compute: each rule against float32, and against made-up executors."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from fractions import Fraction
 

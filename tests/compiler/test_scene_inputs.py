@@ -1,7 +1,5 @@
 """Numbers of a scene as inputs: the same bits as the kernel of constants, for every scene that moves."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

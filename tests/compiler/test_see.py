@@ -1,7 +1,5 @@
 """The program of what is seen past mirrors and glass: the reference's bits, only where it is wanted."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

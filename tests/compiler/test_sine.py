@@ -1,7 +1,5 @@
 """The emitted sines: their derivation added up, coefficients made again, values where they are hard."""
 
-from __future__ import annotations
-
 import importlib.util
 from fractions import Fraction
 from pathlib import Path

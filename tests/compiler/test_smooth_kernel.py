@@ -1,7 +1,5 @@
 """The filter's programs are the reference, its bound is small, and its text is what a device gets."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from rough import rough_layers

@@ -1,7 +1,5 @@
 """A training step as a program: its layout, its error bounds, its kernels' text, and what has no schedule."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Tracing: which program a function gives, and what is said of a function that cannot be traced."""
 
-from __future__ import annotations
-
 import math
 import tracemalloc
 

@@ -1,7 +1,5 @@
 """Tests of variants: names, what is left out, the bound of the move, manifests, refusals."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The verifier refuses each malformed program with its own sentence."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Programs in which nothing rounds: ranges hold all values, and each rule refuses what it must."""
 
-from __future__ import annotations
-
 import re
 from dataclasses import replace
 

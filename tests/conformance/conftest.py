@@ -1,7 +1,5 @@
 """Programs under test, made of the example in the spec: right as it is, wrong with one line changed."""
 
-from __future__ import annotations
-
 import re
 import sys
 from collections.abc import Callable

@@ -4,8 +4,6 @@ Of its mutants (examples/c99/mutants.txt) every third is asked here; `python exa
 all of them.
 """
 
-from __future__ import annotations
-
 import base64
 import importlib.util
 import json

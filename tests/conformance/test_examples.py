@@ -1,7 +1,5 @@
 """The examples of the spec's chapter: programs that share no code with the project, and pass."""
 
-from __future__ import annotations
-
 import shutil
 import subprocess
 from collections import Counter

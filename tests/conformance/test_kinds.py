@@ -1,7 +1,5 @@
 """Kinds: the reference answers its own vectors, wrong references are caught, executors pass."""
 
-from __future__ import annotations
-
 import io
 import json
 import re

@@ -1,7 +1,5 @@
 """Numbers as text: nothing is lost, and what is not a number is refused in one line."""
 
-from __future__ import annotations
-
 import math
 import struct
 

@@ -1,7 +1,5 @@
 """Programs that are wrong in one way each: every one gets the verdict that it deserves, none a traceback."""
 
-from __future__ import annotations
-
 import sys
 from collections import Counter
 

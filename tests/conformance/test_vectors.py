@@ -1,7 +1,5 @@
 """The vectors in the repository are those that the reference makes, in the form that their schema states."""
 
-from __future__ import annotations
-
 import json
 import math
 import re

@@ -1,7 +1,5 @@
 """Cases of integers that float64 decides: none of them is near a tie, so that a bound of 0 holds."""
 
-from __future__ import annotations
-
 import sys
 
 import numpy as np

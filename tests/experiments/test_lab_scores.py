@@ -1,7 +1,5 @@
 """Scores of a picture: each against its definition, FLIP against what its authors publish."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

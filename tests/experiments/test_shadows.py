@@ -1,7 +1,5 @@
 """The experiment on shadow rays: what its rows read, and its scores of a frame."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 import shadows

@@ -1,7 +1,5 @@
 """Pictures before a frame: the layers are those of the definition, whoever renders, and a request says so."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

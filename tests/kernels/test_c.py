@@ -1,7 +1,5 @@
 """C: clean under warnings and sanitizers, exact under all options that keep the standard, refusals."""
 
-from __future__ import annotations
-
 import os
 import platform
 import subprocess

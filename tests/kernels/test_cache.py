@@ -1,7 +1,5 @@
 """The cache folder: where it is, what survives damage, and that writers cannot harm readers."""
 
-from __future__ import annotations
-
 import json
 import sys
 from dataclasses import replace

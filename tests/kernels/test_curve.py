@@ -1,7 +1,5 @@
 """Tests of curves: the choice among points, files, the cache, and a small measurement."""
 
-from __future__ import annotations
-
 import json
 import math
 from dataclasses import fields, replace

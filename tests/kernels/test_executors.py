@@ -1,7 +1,5 @@
 """Every executor against the float64 reference, with the bound that the compiler computes for each pixel."""
 
-from __future__ import annotations
-
 import gc
 import os
 import subprocess

@@ -1,7 +1,5 @@
 """First layers in two passes, on every executor that has them: borders, sizes, ranks, schedules."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Memory of a process stays flat over pictures of a scene that moves: what a picture takes it gives back."""
 
-from __future__ import annotations
-
 import ctypes
 import gc
 import itertools

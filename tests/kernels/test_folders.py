@@ -1,7 +1,5 @@
 """Temporary folders and caches: what is removed, what is left alone, what is trusted."""
 
-from __future__ import annotations
-
 import errno
 import os
 import stat

@@ -1,7 +1,5 @@
 """A history on executors: the reference's, to the bit where arithmetic is that of IEEE 754."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

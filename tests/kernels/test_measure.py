@@ -1,7 +1,5 @@
 """Interleaved times: the order of the runs, what is measured, and what a way measures itself."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 
 from wamnet.kernels import measure

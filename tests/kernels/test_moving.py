@@ -1,7 +1,5 @@
 """One path kernel for scenes that differ in numbers: how often it is compiled, and what it draws."""
 
-from __future__ import annotations
-
 import gc
 from dataclasses import replace
 

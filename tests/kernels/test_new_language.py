@@ -1,7 +1,5 @@
 """How a language is added: one class of words and one line of targets.py give it kernels of every role."""
 
-from __future__ import annotations
-
 import ctypes
 import os
 import subprocess

@@ -1,7 +1,5 @@
 """How a schedule is added: a builder that names no language, and a line for each target that has it."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Each operation of the IR on each executor: a function of one pixel, on ordinary and on awkward numbers."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """Tests of workers whose parent is killed: none stays."""
 
-from __future__ import annotations
-
 import os
 import signal
 import subprocess

@@ -1,7 +1,5 @@
 """The data of a web page: what it holds, and what is refused."""
 
-from __future__ import annotations
-
 import base64
 from dataclasses import asdict, replace
 

@@ -1,7 +1,5 @@
 """Path kernels against the reference, pixel by pixel; test_compare_paths.py compares their paths."""
 
-from __future__ import annotations
-
 import sys
 from dataclasses import replace
 

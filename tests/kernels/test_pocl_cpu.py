@@ -1,7 +1,5 @@
 """Naming the processor for PoCL, on a record made here: no device is touched."""
 
-from __future__ import annotations
-
 import ctypes
 import weakref
 

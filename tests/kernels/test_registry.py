@@ -1,7 +1,5 @@
 """Opening executors: names, options, and what is said when something is missing."""
 
-from __future__ import annotations
-
 import builtins
 import sys
 from types import SimpleNamespace
@@ -119,7 +117,7 @@ class Device:
     def __init__(self, trains: bool = False, device: str = "llvmpipe (LLVM 15.0.6, 256 bits)") -> None:
         self.trains, self.device = trains, device
 
-    def __enter__(self) -> Device:
+    def __enter__(self) -> "Device":
         return self
 
     def __exit__(self, *_error: object) -> None:

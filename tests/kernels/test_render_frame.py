@@ -1,7 +1,5 @@
 """Tests of rendering by an executor's name: the reference's bits, in bands or shared, and the refusal."""
 
-from __future__ import annotations
-
 import multiprocessing
 import threading
 from concurrent.futures import ThreadPoolExecutor

@@ -1,7 +1,5 @@
 """The emitted sines on each executor: at hard points, and beyond their domain."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

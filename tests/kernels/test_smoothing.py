@@ -1,7 +1,5 @@
 """The filter on executors: within its bound of the reference, on hard frames too, and only where it may."""
 
-from __future__ import annotations
-
 from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np

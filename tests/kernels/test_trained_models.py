@@ -5,8 +5,6 @@
 2. Each executor denoises it within the bound of the manifest around the float64 reference.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cache

@@ -1,7 +1,5 @@
 """Triage with planted faults, on each executor: it names the executor, the stage and the pixel."""
 
-from __future__ import annotations
-
 import re
 from dataclasses import replace
 from types import SimpleNamespace

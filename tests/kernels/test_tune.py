@@ -1,7 +1,5 @@
 """The autotuner: what it times, what it leaves out and says, and when its table is taken."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Student's distribution against a closed form, and Welch's test on drawn samples."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from statistical import stats, welch_p

@@ -1,7 +1,5 @@
 """Networks of integers: every executor and schedule gives the reference's bits."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Sources are read back as the kernels that they are; whatever else they may say is refused."""
 
-from __future__ import annotations
-
 import random
 import re
 from contextlib import suppress

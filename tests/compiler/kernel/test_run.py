@@ -1,7 +1,5 @@
 """Kernels in NumPy: near the float64 reference, the bits of C without contraction, the errors of a run."""
 
-from __future__ import annotations
-
 import os
 import subprocess
 from dataclasses import replace

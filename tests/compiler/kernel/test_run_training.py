@@ -1,7 +1,5 @@
 """A training step in NumPy: sums within their bounds, Adam's bits, and what wrong kernels do with memory."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Kernels that are not well formed: each is refused with its reason; those of schedules are accepted."""
 
-from __future__ import annotations
-
 from itertools import product
 
 import numpy as np

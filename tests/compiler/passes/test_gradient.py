@@ -1,7 +1,5 @@
 """The derivative pass: each rule against central differences, networks against the backward pass by hand."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The passes: what they change, what they leave, and that the meaning stays."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """The run: contenders compute what they should, and none that fails or dawdles spoils it for others."""
 
-from __future__ import annotations
-
 import json
 import math
 from collections.abc import Callable

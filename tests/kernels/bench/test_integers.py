@@ -1,7 +1,5 @@
 """Networks of integers in the benchmark: images are rounded, the bound is 0, others' 8 bits are near."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

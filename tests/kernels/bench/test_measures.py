@@ -1,7 +1,5 @@
 """What is measured around the measurements: caches, scenes and noise are the same in every run."""
 
-from __future__ import annotations
-
 import os
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """Mitsuba 3 shows the same pictures: another renderer, written by others, agrees by Welch's test."""
 
-from __future__ import annotations
-
 import sys
 from dataclasses import replace
 from types import SimpleNamespace

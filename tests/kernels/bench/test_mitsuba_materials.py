@@ -4,8 +4,6 @@ The table of a sky and BSDFs are compared direction by direction, in the scalar 
 compiled variant where there is an LLVM, since rough metal asks Python for its masking (mitsuba_looks.py).
 """
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

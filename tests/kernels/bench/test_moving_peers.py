@@ -3,8 +3,6 @@
 Mitsuba's LLVM variant and Blender are skipped where they are missing; the text is that of the benchmark.
 """
 
-from __future__ import annotations
-
 import sys
 from contextlib import ExitStack
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Open Image Denoise's auxiliary images, denoised first."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from packages import needed

@@ -4,8 +4,6 @@ A peer that is not installed is skipped, with the text that the benchmark prints
 Denoise fail where they are required.
 """
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from kit import untrained

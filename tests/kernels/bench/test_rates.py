@@ -1,7 +1,5 @@
 """Rates that were planted are found again, and what drowns in noise is said."""
 
-from __future__ import annotations
-
 import math
 
 import pytest

@@ -1,7 +1,5 @@
 """Products of bytes on graphics processors (WHO-12): stand-ins for what compilers lack."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

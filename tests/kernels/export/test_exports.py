@@ -1,7 +1,5 @@
 """Whole exports: files, manifest and pair of every target; what runs them holds them to their bound."""
 
-from __future__ import annotations
-
 import hashlib
 import json
 import shutil

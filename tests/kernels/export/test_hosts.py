@@ -4,8 +4,6 @@
 shows: never a green test.
 """
 
-from __future__ import annotations
-
 import importlib.util
 import json
 import os

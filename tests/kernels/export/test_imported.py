@@ -1,7 +1,5 @@
 """Imported networks as kernels: on every device within the bound, beside ONNX Runtime, their texts read."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

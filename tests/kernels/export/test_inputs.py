@@ -1,7 +1,5 @@
 """Kernels of a network's inputs in an export: there where they are needed and can be, and named."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 

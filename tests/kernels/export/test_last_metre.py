@@ -1,7 +1,5 @@
 """What programs that nobody here wrote stumbled over: C++, two kernels in one file, macros left behind."""
 
-from __future__ import annotations
-
 import re
 import shutil
 import subprocess

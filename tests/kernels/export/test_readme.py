@@ -1,7 +1,5 @@
 """The README of an export: what it says of the proof is what `wamnet certify` does."""
 
-from __future__ import annotations
-
 import json
 import re
 

@@ -3,8 +3,6 @@
 A runner whose tools are missing skips its tests and says so; `make test` names those that must be there.
 """
 
-from __future__ import annotations
-
 import subprocess
 from dataclasses import asdict, replace
 

@@ -1,7 +1,5 @@
 """Exports of a network of integers (EXP-9, WHO-10): graph and any compiler have the same bits."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

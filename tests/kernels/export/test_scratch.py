@@ -1,7 +1,5 @@
 """Kernels in C on small stacks: the header states enough, and scratch memory replaces a thread's stack."""
 
-from __future__ import annotations
-
 import re
 import shutil
 import subprocess

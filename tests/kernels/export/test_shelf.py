@@ -1,7 +1,5 @@
 """The shelf is what its command writes."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import pytest

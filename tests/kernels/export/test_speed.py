@@ -1,7 +1,5 @@
 """EXP-16: what an export says of its speed is what a clock said, and only where that means something."""
 
-from __future__ import annotations
-
 import hashlib
 import itertools
 import json

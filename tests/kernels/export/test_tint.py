@@ -1,7 +1,5 @@
 """WGSL on two compilers (EXP-5, PRO-1c): the sample of an export keeps its bound on naga and on Tint."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The known answers against their limits, and against other ways to compute them (VRF-2, VRF-3)."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

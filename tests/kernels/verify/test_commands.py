@@ -1,7 +1,5 @@
 """How programs are asked, how they fail, and what formats cannot say (VRF-9, VRF-10)."""
 
-from __future__ import annotations
-
 import json
 import subprocess
 import sys

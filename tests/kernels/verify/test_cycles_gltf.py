@@ -1,7 +1,5 @@
 """Our glTF in another program: Blender's importer and Cycles show the known answers (VRF-14, VRF-15)."""
 
-from __future__ import annotations
-
 from importlib.util import find_spec
 
 import pytest

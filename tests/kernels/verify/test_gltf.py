@@ -1,7 +1,5 @@
 """glTF files: their form, what they say, and what they cannot say (VRF-14)."""
 
-from __future__ import annotations
-
 import base64
 import json
 import math

@@ -1,7 +1,5 @@
 """The test, its correction, intervals and verdicts on drawn samples (VRF-1, VRF-4, VRF-5, VRF-6, VRF-8)."""
 
-from __future__ import annotations
-
 import json
 from dataclasses import replace
 

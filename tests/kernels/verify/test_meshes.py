@@ -1,7 +1,5 @@
 """Scenes as triangles, for formats that have nothing else: every part of every shot."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -1,8 +1,6 @@
 """The project's own tracer: no false alarm, and planted faults are blamed on the right rule (VRF-1,
 VRF-5)."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

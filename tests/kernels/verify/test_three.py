@@ -1,7 +1,5 @@
 """three.js' JSON: what we and three's own ObjectLoader find in it, and what it cannot say (VRF-16)."""
 
-from __future__ import annotations
-
 import base64
 import json
 import os

@@ -60,14 +60,6 @@ def test_windows_match_a_loop_over_taps(shape: tuple[int, int, int], size: int, 
     assert np.array_equal(every.reshape(len(y), -1), expected)
 
 
-def test_centre_tap_of_an_even_window_has_index_half_its_size() -> None:
-    image = np.arange(20 * 20, dtype=np.float64).reshape(20, 20, 1)
-    vector = windows_at(image, [10], [9], Window(12))[0].reshape(12, 12)
-    assert vector[6, 6] == image[10, 9, 0]
-    assert (vector[0, 0], vector[11, 11]) == (image[4, 3, 0], image[15, 14, 0])
-    assert (Window(12).before, Window(12).after, Window(3).before, Window(3).after) == (6, 5, 1, 1)
-
-
 @given(
     sizes=st.lists(st.tuples(st.integers(1, 5), st.integers(1, 5)), min_size=1, max_size=4),
     size=st.integers(1, 6),

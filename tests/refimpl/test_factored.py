@@ -44,13 +44,6 @@ def test_two_passes_are_the_layer(border) -> None:
     assert np.abs(found - expected).max() <= 2 * 75 * 2.0**-53 * 1e2
 
 
-def test_cut_finds_factors_again() -> None:
-    """Weights of rank 3 are their own cut, to the rounding of the decomposition (a few n u |W|)."""
-    weight = factored.expand(random_factors(3))
-    again = factored.expand(factored.cut(weight, SIZE, 3))
-    assert np.abs(again - weight).max() <= 100 * 2.0**-53 * np.linalg.norm(weight)
-
-
 def mean_square_root(difference, shared):
     """Return the root of E|D x|^2 for windows with E[x x^T] = A (rows) A (columns), A = I + shared 1 1^T."""
     a = np.eye(SIZE) + shared

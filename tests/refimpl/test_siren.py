@@ -39,16 +39,6 @@ def test_initial_weights_fill_the_ranges_of_the_source() -> None:
         assert np.abs(weight).max() >= bound * 1e-9 ** (1 / weight.size)
 
 
-def test_initial_weights_have_the_mean_and_variance_of_the_uniform_distribution() -> None:
-    """Two z-tests at 1e-6 each after Sidak: |z| <= 5.03 for significance 1 - (1 - 1e-6)**(1/2)."""
-    weight = siren.init((1000, 100, 3), 1.0, 1.0, seed=9, dtype=np.float64).weights[0].reshape(-1) * 1000
-    z_mean = weight.mean() / math.sqrt(1 / 3 / weight.size)
-    # Of U(-1, 1): the variance of x^2 is 1/5 - 1/9.
-    z_square = (np.square(weight).mean() - 1 / 3) / math.sqrt((1 / 5 - 1 / 9) / weight.size)
-    assert abs(z_mean) <= 5.03
-    assert abs(z_square) <= 5.03
-
-
 def test_seeds_layers_and_kinds_draw_different_numbers() -> None:
     one, two = siren.init((4, 4, 4), 1.0, 1.0, seed=1), siren.init((4, 4, 4), 1.0, 1.0, seed=2)
     draws = [one.weights[0] * 4, one.weights[1] / math.sqrt(6 / 4), two.weights[0] * 4]

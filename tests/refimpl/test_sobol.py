@@ -33,19 +33,6 @@ def points(count, first=0, seed=None, block=3):
     return np.stack(numbers, axis=-1)
 
 
-def test_first_points_by_hand():
-    """Van der Corput's sequence; in the second dimension, of polynomial x + 1, the numbers are 1, 3, 5, 15,
-    so the third point, of index 2 = 10b, is 3/4 and the fourth 1/2 xor 3/4 = 1/4.
-    """
-    first = points(8)
-    assert first[:, 0].tolist() == [0.0, 0.5, 0.25, 0.75, 0.125, 0.625, 0.375, 0.875]
-    assert first[:4, 1].tolist() == [0.0, 0.5, 0.75, 0.25]
-    numbers = [direction >> (31 - k) for k, direction in enumerate(sobol.DIRECTIONS[1][:5])]
-    assert numbers == [1, 3, 5, 15, 17]
-    assert [d >> (31 - k) for k, d in enumerate(sobol.DIRECTIONS[2][:2])] == [1, 3]
-    assert np.all(first[1] == 0.5)
-
-
 def test_points_are_the_published_sequence():
     """SciPy has the same direction numbers, in Gray code's order: its n-th point is ours of n ^ (n >> 1)."""
     n = np.arange(1 << 10)

@@ -22,27 +22,20 @@ def run(theta: Any, gradients: Any, learning_rate: float, **options: float) -> l
     return path
 
 
-def test_two_steps_by_hand() -> None:
-    """With beta_1 = 1/2, beta_2 = 3/4, epsilon = 1, learning rate 1/2, theta = 1 and gradients 4, then -2:
+def test_three_steps_by_hand() -> None:
+    """With beta_1 = 1/2, beta_2 = 3/4, epsilon = 1, learning rate 1/2, theta = 1, gradients 4, -2, then 8:
 
     | t | m                  | v                      | m_hat          | v_hat           | theta             |
     |---|--------------------|------------------------|----------------|-----------------|-------------------|
     | 1 | 4/2 = 2            | 16/4 = 4               | 2/(1/2) = 4    | 4/(1/4) = 16    | 1 - 1/2 4/(4 + 1) |
     | 2 | 2/2 - 2/2 = 0      | 3 + 4/4 = 4            | 0              | 4/(7/16) = 64/7 | unchanged         |
+    | 3 | 8/2 = 4            | 3 + 64/4 = 19          | 4/(7/8) = 32/7 | 19/(37/64)      | as below          |
 
-    so theta is 3/5 after both steps: one rounding of 4/5, one of the product, one of the difference.
-    """
-    path = run([1.0], [[4.0], [-2.0]], 0.5, beta_1=0.5, beta_2=0.75, epsilon=1.0)
-    assert abs(path[0][0] - 0.6) <= 4 * U
-    assert path[1][0] == path[0][0]
-
-
-def test_third_step_by_hand_has_both_moments() -> None:
-    """Continue with gradient 8: m = 4, v = 3 + 16 = 19, m_hat = 4/(7/8) = 32/7, v_hat = 19/(37/64) = 1216/37.
-
-    theta = 3/5 - 1/2 (32/7) / (sqrt(1216/37) + 1) = 3/5 - (16/7) / 6.732793...
+    so theta is 3/5 after two steps: one rounding of 4/5, one of the product, one of the difference.
     """
     path = run([1.0], [[4.0], [-2.0], [8.0]], 0.5, beta_1=0.5, beta_2=0.75, epsilon=1.0)
+    assert abs(path[0][0] - 0.6) <= 4 * U
+    assert path[1][0] == path[0][0]
     expected = 0.6 - 16 / 7 / ((1216 / 37) ** 0.5 + 1)
     # Under ten roundings of numbers below 1 in magnitude, on either side.
     assert abs(path[2][0] - expected) <= 20 * U

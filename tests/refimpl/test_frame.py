@@ -43,45 +43,28 @@ def test_a_missing_layer_is_named() -> None:
         frame["direct"]
 
 
-def test_an_empty_frame_is_refused() -> None:
-    """A frame without layers has no size."""
-    with pytest.raises(InputError, match="frame: has no layers"):
-        validate(Frame({}))
-
-
-def test_an_unknown_layer_is_refused() -> None:
-    """The known names are listed."""
-    with pytest.raises(
-        InputError, match=r"layer 'alpha': unknown \(choose one of color, albedo, normal, depth"
-    ):
-        validate(Frame({"alpha": np.zeros((1, 1, 1))}))
+TYPES = [np.zeros((1, 1, 3), np.uint8), np.zeros((1, 1, 3), np.float16), [[[0.0, 0.0, 0.0]]]]
+SHAPES = [(2, 2), (2, 2, 1), (2, 2, 4), (0, 2, 3), (2, 0, 3)]
+"""Integers, halves and lists; a wrong number of axes, of channels, and no pixel."""
 
 
 @pytest.mark.parametrize(
-    "values", [np.zeros((1, 1, 3), np.uint8), np.zeros((1, 1, 3), np.float16), [[[0.0, 0.0, 0.0]]]]
-)
-def test_other_element_types_are_refused(values: object) -> None:
-    """Integers, halves and lists."""
-    with pytest.raises(
-        InputError, match=r"element type of layer 'color' '(uint8|float16|list)': must be float32"
-    ):
-        validate(Frame({"color": values}))  # type: ignore[dict-item]
-
-
-@pytest.mark.parametrize("shape", [(2, 2), (2, 2, 1), (2, 2, 4), (0, 2, 3), (2, 0, 3)])
-def test_wrong_shapes_are_refused(shape: tuple[int, ...]) -> None:
-    """Wrong number of axes, of channels, and no pixel."""
-    with pytest.raises(InputError, match=r"shape of layer 'color' \(.*must be \(height, width, 3\)"):
-        validate(Frame({"color": np.zeros(shape)}))
-
-
-def test_different_sizes_are_refused() -> None:
-    """The message gives each layer's width x height."""
-    frame = Frame({"color": np.zeros((2, 3, 3)), "depth": np.zeros((3, 2, 1))})
-    with pytest.raises(
-        InputError, match="sizes of the layers 'color 3x2, depth 2x3': all layers must have the same size"
-    ):
-        validate(frame)
+    ("layers", "rule"),
+    [
+        ({}, "frame: has no layers"),
+        ({"alpha": np.zeros((1, 1, 1))}, r"layer 'alpha': unknown \(choose one of color, albedo, normal, d"),
+        ({"color": np.zeros((2, 3, 3)), "depth": np.zeros((3, 2, 1))},
+         "sizes of the layers 'color 3x2, depth 2x3': all layers must have the same size"),
+        *(({"color": values}, r"element type of layer 'color' '(uint8|float16|list)': must be float32")
+          for values in TYPES),
+        *(({"color": np.zeros(shape)}, r"shape of layer 'color' \(.*must be \(height, width, 3\)")
+          for shape in SHAPES),
+    ],
+)  # fmt: skip
+def test_what_is_no_frame_is_refused(layers: dict[str, np.ndarray], rule: str) -> None:
+    """Known names are listed, and sizes are given as width x height."""
+    with pytest.raises(InputError, match=rule):
+        validate(Frame(layers))
 
 
 @pytest.mark.parametrize("value", [np.nan, np.inf, -np.inf])

@@ -6,8 +6,10 @@ from functools import cache
 
 import pytest
 import rewrite
-from lab import gallery, plots, records, results, shown, texts
+from lab import gallery, plots, records, results, shown, support, texts
 from lab.records import Records, checked
+
+from wamnet.kernels.export.targets import NAMES
 
 pytest.importorskip("matplotlib", reason="matplotlib is not installed")
 
@@ -38,6 +40,11 @@ def test_texts_are_what_the_records_give(filled):
     assert not stale, f"{stale}: run python experiments/rewrite.py, and read the difference"
     unused = sorted((set(shown.TABLES) | set(shown.FIGURES)) - filler.shown)
     assert not unused, f"lab/shown.py: no text shows {unused}"
+
+
+def test_every_target_has_a_row_of_the_support_matrix():
+    lines = support.matrix(Records()).splitlines()[2:]
+    assert sorted(line.split("`")[1] for line in lines) == sorted(NAMES)
 
 
 def test_plots_are_what_the_records_give():

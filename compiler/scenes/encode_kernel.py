@@ -7,16 +7,12 @@
 3. Put both together with a manifest [`compile_encode`].
 
 Colour may have any size before it is clipped, so there is no bound over all sums; at given sums the rules of
-bounds.py give one for every channel of every pixel [`error_at`].
+bounds.py give one for every channel of every pixel [tests/support/errors_at.py].
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from typing import Any
-
-import numpy as np
-from numpy.typing import NDArray
+from collections.abc import Sequence
 
 from ...refimpl.errors import CompileError, InputError
 from ...refimpl.frame import HISTORY, SEEN, SEEN_DIRECT, SUN
@@ -38,12 +34,11 @@ from ..core.profiles import IEEE
 from ..kernel.interface import ENCODE, IMAGE, INTEGERS, READ, WRITE, Array, Interface, image_of
 from ..kernel.interface import SUMS as SUMS_ARRAY
 from ..kernel.kernel import Body, Kernel, Let, Store, apply, const, load, name
-from ..proof.bounds import Enclosure
 from ..schedules.common import X, Y, lets
 from ..targets import Language, language_named
 from .emit_path import GROUPS, SUMMED, Encoding
 from .lower_scene import FeatureRays
-from .plane_kernel import compiled, enclosed, exactly, reads
+from .plane_kernel import compiled, reads
 from .values import Given, floats, lowered, numbered
 
 SCHEMA = "wamnet-encode-kernel-1"
@@ -199,19 +194,3 @@ def encoding_of(
     """Return the encoding of features after the passes of a profile, and the images that it makes."""
     program = pipeline.run(lower_encode(features, normalization, whole, rays), passes)
     return Encoding(program, images_of(features, normalization, whole))
-
-
-def error_at(artifact: Artifact, sums: Mapping[str, Any], samples: int) -> dict[str, NDArray[np.float64]]:
-    """Return the bound (H, W, C) of each image's error against float64, at planes of sums (H, W) by name."""
-    given = {each: exactly(sums[each]) for each in planes_of([i.name for i in artifact.images])}
-    given[SAMPLES] = exactly(np.full(next(iter(given.values())).low.shape, float(samples)))
-    return encoded_errors(artifact, given)
-
-
-def encoded_errors(artifact: Artifact, given: Mapping[str, Enclosure]) -> dict[str, NDArray[np.float64]]:
-    """Return the bound (H, W, C) of each image's error, of planes that have errors themselves."""
-    found = enclosed(artifact, artifact.programs, given)
-    return {
-        image.name: np.stack([found[f"{image.name}_{c}"].read for c in range(image.channels)], axis=-1)
-        for image in artifact.images
-    }

@@ -10,9 +10,6 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
-import numpy as np
-from numpy.typing import NDArray
-
 from ...refimpl.errors import CompileError
 from ..artifact import Artifact
 from ..compile import CALLED, assemble
@@ -21,8 +18,7 @@ from ..core.ir import Image, Program
 from ..kernel.interface import ENCODE
 from ..kernel.kernel import Expr, Kernel, Let
 from ..languages.renderer import Renderer
-from ..proof.bounds import Enclosure, enclose
-from ..targets import Language, language_named
+from ..targets import Language
 
 
 def reads(names: Sequence[str], element: Callable[[int], Expr], prefix: str = "") -> list[Let]:
@@ -79,17 +75,3 @@ def compiled(
         lists=lists,
         notes=notes,
     )
-
-
-def exactly(values: NDArray[Any]) -> Enclosure:
-    """Return the enclosure of numbers (H, W) that a kernel is given."""
-    exact = np.asarray(values, np.float64)
-    return Enclosure(exact, exact, np.zeros_like(exact))
-
-
-def enclosed(kernel: Artifact, program: Program, given: Mapping[str, Enclosure]) -> dict[str, Enclosure]:
-    """Return the enclosures of the outputs of a kernel's program, of inputs that have errors."""
-    known = {i: given[str(node["name"])] for i, node in enumerate(program.nodes) if node.op == "input"}
-    contract = language_named(kernel.target).under(kernel.profile).sine
-    found = enclose(program, {}, contract, known=known, local=False)
-    return {name: found[index] for name, index in program.outputs}

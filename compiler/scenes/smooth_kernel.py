@@ -11,18 +11,16 @@
 3. Put both together with manifests, and with the encoding that exists for sums [`compile_smoothing`].
 
 Guides may have any size, so there is no bound over all layers; at given ones the rules of bounds.py, tap by
-tap and level by level, give one for every channel of every pixel [`error_at`].
+tap and level by level, give one for every channel of every pixel [tests/support/errors_at.py].
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import partial
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ...refimpl.frame import LAYERS
 from ...refimpl.network import smoothing
@@ -59,12 +57,11 @@ from ..kernel.kernel import (
     name,
     splat,
 )
-from ..proof.bounds import Enclosure
 from ..schedules.common import HEIGHT, WIDTH, X, Y, clamp, lets, loop
 from ..targets import Language, language_named
 from .emit_path import GROUPS
-from .encode_kernel import PASSES, SAMPLES, compile_encode, encoded_errors
-from .plane_kernel import check_lanes, compiled, enclosed, exactly, reads
+from .encode_kernel import PASSES, compile_encode
+from .plane_kernel import check_lanes, compiled, reads
 from .values import RGB, XYZ, Given, floats, lowered, names, numbered
 
 SCHEMA = "wamnet-smooth-kernel-1"
@@ -247,35 +244,3 @@ def smooth_kernel(programs: SmoothPrograms, lanes: int) -> Kernel:
     made = Interface(SMOOTH, (planes_of(GUIDES, READ, len(programs.guides)), *light), INTEGERS[SMOOTH])
     tables = ((TABLE, np.array(smoothing.SPLINE, np.float32)),)
     return Kernel(made, body, step=(const(lanes), const(1)), tables=tables)
-
-
-# ---- errors -------------------------------------------------------------------------------------------
-
-
-def error_at(kernels: SmoothKernels, layers: Mapping[str, NDArray[Any]]) -> NDArray[np.float64]:
-    """Return the bound (H, W, 3) of a feature image's error against float64, at layers (H, W, C) by name."""
-    programs, of = kernels.smooth.programs, partial(enclosed, kernels.smooth)
-    given = {
-        f"{layer.name}_{c}": exactly(layers[layer.name][..., c])
-        for layer in LAYERS_READ
-        for c in range(layer.channels)
-    }
-    planes = of(programs.guide, given)
-    height, width = layers[FEATURE].shape[:2]
-    here = {f"{HERE}{name}": planes[name] for name in programs.guides}
-    light = {name: planes[name] for name in LIGHT_PLANES}
-    for level in range(smoothing.LEVELS):
-        sums = dict.fromkeys((*SUMS, WEIGHTS), exactly(np.zeros((height, width))))
-        for spline, rows, columns in smoothing.taps(height, width, 2**level):
-            there = np.ix_(rows, columns)
-            seen = {f"{THERE}{name}": _moved(planes[name], there) for name in GUIDED}
-            lit = {name: _moved(light[name], there) for name in LIGHT_PLANES}
-            share = {SPLINE: exactly(np.full((height, width), spline))}
-            sums = of(programs.tap, {**here, **seen, **lit, **share, **sums})
-        light = of(programs.mean, sums)
-    return encoded_errors(kernels.encode, {**light, SAMPLES: exactly(np.ones((height, width)))})[FEATURE]
-
-
-def _moved(found: Enclosure, there: Any) -> Enclosure:
-    """Return the enclosures (H, W) of a plane at the pixels of a tap."""
-    return Enclosure(found.low[there], found.high[there], found.error[there])

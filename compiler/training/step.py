@@ -5,13 +5,12 @@
    squared error, and to the factors of every derivative [`Step`]. It is a program like any other: verified,
    interpreted, bounded, rewritten by passes.
 2. What the examples give is added up: for each sum the outer products of two outputs, or one output
-   [`Sum`, `sums`].
-3. Weights change from step to step: each step gets its own [`with_parameters`]. A matrix that is also
-   used transposed is there twice, the second time under its name and [`TRANSPOSED`].
+   [`Sum`].
+3. Weights change from step to step. A matrix that is also used transposed is there twice, the second time
+   under its name and [`TRANSPOSED`].
 4. The error of a sum follows from the enclosures of what is added, for every order of summation
    [`sum_errors`].
-5. Where the first layer has low rank, its factors move in place of its matrix [`Split`]; the error of their
-   derivatives follows from that of the matrix's [`factor_errors`].
+5. Where the first layer has low rank, its factors move in place of its matrix [`Split`].
 6. Adam's update of one number is traced too: learning rate and the growth of the means are inputs
    [`lower_adam`].
 """
@@ -24,17 +23,15 @@ from itertools import pairwise
 from typing import Any
 
 import numpy as np
-from numpy.typing import DTypeLike, NDArray
+from numpy.typing import NDArray
 
-from ...refimpl.network import adam, factored, siren
+from ...refimpl.network import adam, siren
 from ...refimpl.network.activation import SINE
-from ...refimpl.network.factored import Factors
 from ...refimpl.network.siren import Siren
 from ...refimpl.network.train import squared_error
-from ..core.interpret import interpret
 from ..core.ir import Program, Type
 from ..core.passes import pipeline
-from ..core.passes.gradient import TRANSPOSED, Sum, gradient
+from ..core.passes.gradient import Sum, gradient
 from ..core.profiles import EMITTED_COSINE, EMITTED_SINE, FLUSH
 from ..core.sums import gamma
 from ..core.trace import trace
@@ -142,26 +139,6 @@ def lower_adam() -> Program:
     return pipeline.run(trace(function, {name: Type() for name in ADAM_INPUTS}), pipeline.COMMON)
 
 
-def with_parameters(step: Step, arrays: Mapping[str, Array]) -> Step:
-    """Return the step at other weights: `arrays` holds one for each parameter that is trained."""
-    given = {name: np.asarray(arrays[name.removesuffix(TRANSPOSED)]) for name in step.program.parameters}
-    parameters = {
-        name: np.ascontiguousarray(array.T if name.endswith(TRANSPOSED) else array)
-        for name, array in given.items()
-    }
-    return replace(step, program=replace(step.program, parameters=parameters))
-
-
-def sums(step: Step, windows: Array, targets: Array, dtype: DTypeLike = np.float64) -> dict[str, Array]:
-    """Return each sum over examples windows (N, D_in), targets (N, 3): as its parameter; squares (3,)."""
-    values = interpret(step.program, {WINDOW: windows, TARGET: targets}, dtype)
-    found = {}
-    for known in step.sums:
-        left = values[known.left]
-        found[known.parameter] = left.sum(axis=0) if known.right is None else left.T @ values[known.right]
-    return found
-
-
 def sum_errors(step: Step, windows: Array, targets: Array) -> dict[str, Array]:
     """Return how far each sum of a kernel may be from the float64 one, at given examples.
 
@@ -172,32 +149,6 @@ def sum_errors(step: Step, windows: Array, targets: Array) -> dict[str, Array]:
     nodes = enclose(step.program, given, EMITTED_SINE, EMITTED_COSINE, local=False)
     ends = dict(step.program.outputs)
     return {known.parameter: _sum_error(known, ends, nodes, len(windows)) for known in step.sums}
-
-
-def factor_errors(factors: Factors, dweight: Array, error: Array) -> Factors:
-    """Return how far the kernels' derivatives by both factors may be from [`factored.backward`].
-
-    `error` (D_out, D_in) is that of dweight. A sum of n products is rounded at most n + 1 times.
-    """
-    magnitude = _magnitude(factors)
-    errors = factored.backward(magnitude, error)
-    sizes = factored.backward(magnitude, np.abs(dweight) + error + FLUSH)
-    n_out, run = magnitude.vertical.shape[0] * magnitude.vertical.shape[1], magnitude.horizontal.shape[1]
-    terms = (errors.vertical, sizes.vertical, run), (errors.horizontal, sizes.horizontal, n_out)
-    return Factors(*((e + gamma(n + 1) * s + 2 * n * FLUSH) * (1 + OUTWARD) for e, s, n in terms))
-
-
-def _magnitude(factors: Factors) -> Factors:
-    """Return the sizes of all numbers of both factors."""
-    return Factors(np.abs(factors.vertical.astype(np.float64)), np.abs(factors.horizontal.astype(np.float64)))
-
-
-def expansion_error(factors: Factors) -> Array:
-    """Return how far the kernels' product (D_out, D_in) of two factors may be from [`factored.expand`]."""
-    magnitude = _magnitude(factors)
-    rank = factors.rank
-    widened: Array = (gamma(rank + 1) * factored.expand(magnitude) + 2 * rank * FLUSH) * (1 + OUTWARD)
-    return widened
 
 
 def _sum_error(known: Sum, ends: Mapping[str, int], nodes: Sequence[Enclosure], n: int) -> Array:

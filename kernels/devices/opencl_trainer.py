@@ -44,7 +44,7 @@ class OpenCLTrainer:
     def __init__(
         self, queue: Any, program: Any, kernel: Artifact, values: NDArray[Any], targets: NDArray[Any]
     ) -> None:
-        self._queue, self._context, self._split = queue, queue.context, kernel.programs.split
+        self._queue, self._context = queue, queue.context
         self._places, self._copies = slots(kernel.programs), transposed_slots(kernel.programs)
         device = queue.device
         if values.size >= INDEX_LIMIT or values.nbytes > device.max_mem_alloc_size:
@@ -121,16 +121,6 @@ class OpenCLTrainer:
         cl.enqueue_copy(self._queue, numbers, self._states[step % 2])
         theta, m, v = (unpack(self._trained, part) for part in np.split(numbers, 3))
         return theta, m, v
-
-    def sums(self) -> dict[str, NDArray[np.float32]]:
-        """Return the sums of the last step, by parameter; work items are added in their order."""
-        found = np.empty((self._groups, self._places[SQUARES].end * LANES), np.float32)
-        cl.enqueue_copy(self._queue, found, self._arrays["sums"])
-        if self._split is not None:
-            # These are one sum already, in the first work item's slot.
-            for slot in (self._places[name] for name in (self._split.parameter, *self._split.factors)):
-                found[1:, slot.offset * LANES : slot.end * LANES] = 0
-        return unpack(self._places, np.add.accumulate(found, axis=0)[-1])
 
     def _upload(self, array: NDArray[Any]) -> Any:
         """Return a device buffer with the array's content."""

@@ -8,6 +8,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from errors_at import encoding_errors
 from small_page import (
     AT_REST,
     COLORS,
@@ -25,7 +26,7 @@ from small_page import (
 )
 
 from wamnet.cli.reports import webpage
-from wamnet.compiler.scenes.encode_kernel import compile_encode, error_at, layers_of
+from wamnet.compiler.scenes.encode_kernel import compile_encode, layers_of
 from wamnet.compiler.scenes.lower_scene import FeatureRays, lower_scene
 from wamnet.compiler.scenes.path_kernel import compile_path
 from wamnet.kernels.devices.kernel import Part
@@ -148,7 +149,7 @@ def test_the_features_keep_the_bound_of_the_encoding(still, model):
         for end in ends
     ]
     planes = {name: sums[..., i] for i, name in enumerate(names)}
-    errors = error_at(compile_encode(FEATURES, SCALES, P.TARGET), planes, 1)
+    errors = encoding_errors(compile_encode(FEATURES, SCALES, P.TARGET), planes, 1)
     for first, name in zip((0, 3, 6), FEATURES, strict=True):
         values = sums[..., first : first + 3].astype(np.float64)
         expected = dataset.FEATURES[name].encode(values, SCALES)

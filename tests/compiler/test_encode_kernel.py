@@ -4,6 +4,7 @@ import json
 
 import numpy as np
 import pytest
+from errors_at import encoding_errors
 
 from wamnet.compiler import artifact
 from wamnet.compiler.core import ir
@@ -11,7 +12,6 @@ from wamnet.compiler.core.interpret import interpret
 from wamnet.compiler.scenes.encode_kernel import (
     SAMPLES,
     compile_encode,
-    error_at,
     layers_of,
     lower_encode,
     planes_of,
@@ -64,7 +64,7 @@ def test_float32_is_within_the_bound_which_is_small(samples):
     """2^-18 is 64 u: 37 of them the power's where it is worst, 5 each division's, scales the rest."""
     artifact, sums = compile_encode(ALL, SCALES, "numpy"), sums_of(samples)
     exact, found = (interpreted(artifact.programs, sums, samples, kind) for kind in (np.float64, np.float32))
-    for name, errors in error_at(artifact, sums, samples).items():
+    for name, errors in encoding_errors(artifact, sums, samples).items():
         assert np.all(errors <= 2.0**-18)
         for channel in range(FEATURES[name].channels):
             both = [values[f"{name}_{channel}"].astype(np.float64) for values in (exact, found)]
@@ -75,7 +75,7 @@ def test_the_bound_catches_an_exponent_of_2_2():
     artifact, sums = compile_encode(("color",), SCALES, "numpy"), sums_of(1)
     exact = interpreted(artifact.programs, sums, 1, np.float64)["color_0"]
     wrong = np.clip(sums["color_r"] * 2**0.5, 0, 1) ** (1 / 2.2)
-    assert np.any(np.abs(wrong - exact) > error_at(artifact, sums, 1)["color"][..., 0])
+    assert np.any(np.abs(wrong - exact) > encoding_errors(artifact, sums, 1)["color"][..., 0])
 
 
 @pytest.mark.parametrize("target", ["opencl", "opengl"])

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from errors_at import smoothing_error
 from rough import rough_layers
 
 from wamnet.compiler.core.interpret import interpret
@@ -15,7 +16,6 @@ from wamnet.compiler.scenes.smooth_kernel import (
     THERE,
     WEIGHTS,
     compile_smoothing,
-    error_at,
     lower_smooth,
 )
 from wamnet.compiler.targets import language_named
@@ -76,7 +76,7 @@ def test_the_bound_is_small_and_below_that_of_all_layers():
     """At ordinary layers a hundredth of the clause's number, and never above it."""
     kernels = compile_smoothing(SCALES, "numpy")
     for seed in range(3):
-        found = error_at(kernels, rough_layers(8, 9, seed))
+        found = smoothing_error(kernels, rough_layers(8, 9, seed))
         assert found.max() <= A_PRIORI
         assert np.median(found) <= A_PRIORI / 100
 

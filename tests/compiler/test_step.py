@@ -5,6 +5,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+import step_sums
 
 from wamnet.compiler.core.interpret import interpret
 from wamnet.compiler.core.ir import Node, Type, attributes
@@ -42,12 +43,12 @@ def test_errors_hold_for_float32_in_any_order() -> None:
     """NumPy's float32 sums, forwards and backwards, are executors like others; the bound fits."""
     random = np.random.default_rng(2)
     found = lower_step(WIDTHS, 2.0, 10.0, 50)
-    found = step.with_parameters(found, weights(3, found.trained, found.program))
+    found = step_sums.with_parameters(found, weights(3, found.trained, found.program))
     x = random.uniform(-1, 1, (50, WIDTHS[0])).astype(np.float32)
     t = random.uniform(0, 1, (50, 3)).astype(np.float32)
-    exact, bound = step.sums(found, x, t), step.sum_errors(found, x, t)
+    exact, bound = step_sums.sums(found, x, t), step.sum_errors(found, x, t)
     for order in (slice(None), slice(None, None, -1)):
-        single = step.sums(found, x[order], t[order], np.float32)
+        single = step_sums.sums(found, x[order], t[order], np.float32)
         for name, error in bound.items():
             assert np.all(np.abs(single[name] - exact[name]) <= error), name
             assert np.isfinite(error).all()

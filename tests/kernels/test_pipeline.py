@@ -7,6 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from errors_at import encoding_errors
 from kit import encoded
 
 from wamnet.compiler.compile import compile_plan
@@ -15,7 +16,7 @@ from wamnet.compiler.core.lower import lower
 from wamnet.compiler.plan import analysed
 from wamnet.compiler.proof import bounds
 from wamnet.compiler.scenes.emit_path import GROUPS
-from wamnet.compiler.scenes.encode_kernel import compile_encode, encoding_of, error_at, layers_of
+from wamnet.compiler.scenes.encode_kernel import compile_encode, encoding_of, layers_of
 from wamnet.compiler.scenes.lower_scene import lower_scene
 from wamnet.compiler.scenes.path_kernel import compile_path
 from wamnet.compiler.targets import language_named
@@ -114,7 +115,7 @@ def test_the_pipeline_is_the_separate_way(executor, model_of, case, sums):
         found = pipeline.run(seed=3, spp=samples)
         images = {feature: pipeline.image(feature) for feature in features}
     sums, encode = traced(executor, model, name, (size, samples), 3)
-    errors = error_at(encode, sums, samples)
+    errors = encoding_errors(encode, sums, samples)
     assert found.shape == (*size, 3)
     assert found.dtype == np.float32
     frame = frame_of(sums, samples, features)
@@ -144,7 +145,7 @@ def test_images_at_the_end_of_paths_are_those_of_the_encoding(executor_named, la
         wanted = encoded(executor, encode, sums, 2)
         kernel = compile_path(programs, name, lanes, layers_of(features), encoding_of(features, SCALES))
         found = executor.call(kernel, {}, part.integers)
-        errors = error_at(encode, dict(zip(sums_kernel.planes, sums, strict=True)), 2)
+        errors = encoding_errors(encode, dict(zip(sums_kernel.planes, sums, strict=True)), 2)
         for feature in features:
             apart = np.abs(found[f"image_{feature}"].astype(np.float64) - wanted[feature])
             assert np.all(apart <= (0 if name == "c" else 2 * errors[feature]))
@@ -183,7 +184,7 @@ def test_features_of_their_own_rays_are_the_separate_way_s(executor, model_of, c
         for layer in layers_of(features)
         for c, plane in enumerate(GROUPS[layer])
     }
-    errors, near = error_at(encode, planes, spp), np.ones(size, bool)
+    errors, near = encoding_errors(encode, planes, spp), np.ones(size, bool)
     for feature in features:
         wanted = dataset.feature_image(frame, (feature,), SCALES)
         off = 2 * errors[feature] + 2.0**-23 * np.abs(wanted)

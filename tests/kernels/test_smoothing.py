@@ -4,9 +4,10 @@ from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 import pytest
+from errors_at import smoothing_error
 from rough import rough_layers
 
-from wamnet.compiler.scenes.smooth_kernel import compile_smoothing, error_at
+from wamnet.compiler.scenes.smooth_kernel import compile_smoothing
 from wamnet.kernels.devices.passes import Filter
 from wamnet.kernels.run.denoise_on import Denoiser, denoise_on, images_of
 from wamnet.refimpl.errors import InputError
@@ -30,7 +31,7 @@ def bound_of(kernels, layers):
     """Return the bound (H, W, 3) at layers, in which NaN is 0."""
     key = b"".join(values.tobytes() for values in layers.values())
     if key not in BOUNDS:
-        BOUNDS[key] = error_at(kernels, layers)
+        BOUNDS[key] = smoothing_error(kernels, layers)
     return BOUNDS[key]
 
 

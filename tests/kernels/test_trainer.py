@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 import pyopencl as cl
 import pytest
+import step_sums
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -21,6 +22,7 @@ from wamnet.compiler.kernel.run import run_on
 from wamnet.compiler.proof.bounds import enclose
 from wamnet.compiler.training import step
 from wamnet.compiler.training.step_kernel import compile_step
+from wamnet.compiler.training.step_layout import LANES, slots
 from wamnet.kernels.devices.opencl_trainer import OpenCLTrainer
 from wamnet.kernels.run import trainer
 from wamnet.kernels.run.trainer import train_on
@@ -101,6 +103,13 @@ def examples(recipe: Recipe, data: Dataset, number: int) -> tuple[Any, Any]:
 # ---- derivatives -----------------------------------------------------------------------------------------
 
 
+def sums_of(device: Any, traced: step.Step) -> dict[str, Any]:
+    """Return the sums of a device's last step, by parameter."""
+    found = np.empty((device._groups, slots(traced)[step.SQUARES].end * LANES), np.float32)
+    cl.enqueue_copy(device._queue, found, device._arrays["sums"])
+    return step_sums.summed(traced, found, len(found))
+
+
 def gradient_excess(opencl: Any, recipe: Recipe, kernel: Artifact | None = None, pairs: Any = PAIRS) -> float:
     """Return the excess of the first step's sums over the bound at its examples."""
     data = data_of(recipe, pairs)
@@ -108,22 +117,22 @@ def gradient_excess(opencl: Any, recipe: Recipe, kernel: Artifact | None = None,
     run = begin(opencl, recipe, kernel or kernel_of(recipe), state, data)
     run.enqueue(run.draw(0, 1))
     loss = run.settle()
-    found = run.device.sums()
     right = kernel_of(recipe).programs
+    found = sums_of(run.device, right)
     named = trainer.named(state.siren.weights + state.siren.biases)
-    at = step.with_parameters(right, named)
+    at = step_sums.with_parameters(right, named)
     windows, targets = examples(recipe, data, 0)
-    exact, bound = step.sums(at, windows, targets), step.sum_errors(at, windows, targets)
+    exact, bound = step_sums.sums(at, windows, targets), step.sum_errors(at, windows, targets)
     assert all(np.isfinite(error).all() and error.max() > 0 for error in bound.values())
     if recipe.rank:
         old, new = (doubled(each.factors) for each in (state, run.state(1)))
         slopes, errors = (
             factored.backward(old, exact["W0"]),
-            step.factor_errors(old, exact["W0"], bound["W0"]),
+            step_sums.factor_errors(old, exact["W0"], bound["W0"]),
         )
         for name, part in zip(step.factor_names("W0"), ("vertical", "horizontal"), strict=True):
             exact[name], bound[name] = getattr(slopes, part), getattr(errors, part)
-        exact["product"], bound["product"] = factored.expand(new), step.expansion_error(new)
+        exact["product"], bound["product"] = factored.expand(new), step_sums.expansion_error(new)
         found["product"] = run.state(1).siren.weights[0]
     assert sorted(found) == sorted(exact)
     worst = [np.max(np.abs(found[n].reshape(exact[n].shape) - exact[n]) / bound[n]) for n in exact]
@@ -192,9 +201,9 @@ def adam_excess(opencl: Any, kernel: Artifact | None = None, recipe: Recipe = SM
         run.enqueue(run.draw(number, number + 1))
         run.settle()
         after = [trainer.named(arrays) for arrays in _groups(run.state(number + 1))]
-        at = step.with_parameters(right, before[0])
+        at = step_sums.with_parameters(right, before[0])
         windows, targets = examples(recipe, data, number)
-        exact, bound = step.sums(at, windows, targets), step.sum_errors(at, windows, targets)
+        exact, bound = step_sums.sums(at, windows, targets), step.sum_errors(at, windows, targets)
         rates = (train.rate_at(recipe, number), *adam.growth(number + 1))
         for name in before[0]:
             old, new = ([arrays[name] for arrays in arrays_of] for arrays_of in (before, after))

@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+import step_sums
 
 from wamnet.compiler.core.interpret import interpret
 from wamnet.compiler.core.passes.gradient import TRANSPOSED
@@ -12,7 +13,7 @@ from wamnet.compiler.kernel.verify import KernelError
 from wamnet.compiler.training import step, step_kernel
 from wamnet.compiler.training.step import ADAM_INPUTS, lower_adam
 from wamnet.compiler.training.step_kernel import compile_step
-from wamnet.compiler.training.step_layout import LANES, pack, slots, transposed_slots, unpack
+from wamnet.compiler.training.step_layout import pack, slots, transposed_slots, unpack
 from wamnet.refimpl.network import adam, factored
 from wamnet.refimpl.network.factored import Factors
 
@@ -64,14 +65,6 @@ def ran(kernel, arrays):
     return run_on(kernel, arrays, {"groups": GROUPS, "at": 1, "step": 7})
 
 
-def summed(traced, sums):
-    """Return the sums of both items by name; those of factors and of their product are one already."""
-    both, places = sums.reshape(GROUPS, -1, LANES).copy(), slots(traced)
-    for key in (traced.split.parameter, *traced.split.factors) if traced.split else ():
-        both[1, places[key].offset : places[key].end] = 0
-    return unpack(places, both[0] + both[1])
-
-
 def factors_of(arrays):
     vertical, horizontal = (arrays[key].astype(np.float64) for key in step.factor_names("W0"))
     return Factors(vertical.reshape(len(vertical), SIZE, -1), horizontal)
@@ -80,13 +73,16 @@ def factors_of(arrays):
 def wrong_in(compiled, arrays, examples, left):
     """Return what a step has left that is beyond its bounds, or has other bits than Adam's."""
     traced, trained = compiled.programs, trained_of(compiled.programs)
-    sums, places, first = summed(traced, left["sums"]), slots(traced), left["sums"].reshape(GROUPS, -1)[0]
+    sums, places = step_sums.summed(traced, left["sums"], GROUPS), slots(traced)
+    first = left["sums"].reshape(GROUPS, -1)[0]
     before, after = (
         [unpack(trained, part) for part in state.reshape(3, -1)] for state in (arrays["old"], left["moved"])
     )
     shapes = {key: traced.program.parameters[key].shape for key in traced.trained}
-    at = step.with_parameters(traced, {key: before[0][key].reshape(shape) for key, shape in shapes.items()})
-    exact, bound = step.sums(at, *examples), step.sum_errors(at, *examples)
+    at = step_sums.with_parameters(
+        traced, {key: before[0][key].reshape(shape) for key, shape in shapes.items()}
+    )
+    exact, bound = step_sums.sums(at, *examples), step.sum_errors(at, *examples)
     right = {key: np.abs(sums[key].reshape(exact[key].shape) - exact[key]) <= bound[key] for key in bound}
     loss = exact[step.SQUARES].sum() / (3 * BATCH)
     right["loss"] = left["losses"][0] == 0 and abs(left["losses"][1] - loss) <= 1e-5 * loss
@@ -100,10 +96,10 @@ def wrong_in(compiled, arrays, examples, left):
     if traced.split:
         old, new, slopes = map(factors_of, (before[0], after[0], sums))
         expected = factored.backward(old, exact["W0"])
-        errors = step.factor_errors(old, exact["W0"], bound["W0"])
+        errors = step_sums.factor_errors(old, exact["W0"], bound["W0"])
         right["vertical"] = np.abs(slopes.vertical - expected.vertical) <= errors.vertical
         right["horizontal"] = np.abs(slopes.horizontal - expected.horizontal) <= errors.horizontal
-        right["product"] = np.abs(after[0]["W0"] - factored.expand(new)) <= step.expansion_error(new)
+        right["product"] = np.abs(after[0]["W0"] - factored.expand(new)) <= step_sums.expansion_error(new)
     return {key for key, each in right.items() if not np.all(each)}
 
 

@@ -4,6 +4,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+import step_sums
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -12,7 +13,6 @@ from wamnet.compiler.core.ops import OPS
 from wamnet.compiler.core.passes.gradient import gradient
 from wamnet.compiler.core.passes.rewrite import eliminate_dead, fuse_bias
 from wamnet.compiler.core.trace import trace
-from wamnet.compiler.training import step
 from wamnet.compiler.training.step import lower_step, step_of
 from wamnet.refimpl.errors import CompileError
 from wamnet.refimpl.network import siren, train
@@ -70,10 +70,10 @@ def test_rule_against_central_differences(op: str) -> None:
     moved = {name: random.uniform(-1, 1, array.shape) for name, array in base.items()}
 
     def loss(scale: float) -> float:
-        at = step.with_parameters(found, {name: base[name] + scale * moved[name] for name in base})
-        return float(step.sums(at, x, t)["squares"].sum()) / 8
+        at = step_sums.with_parameters(found, {name: base[name] + scale * moved[name] for name in base})
+        return float(step_sums.sums(at, x, t)["squares"].sum()) / 8
 
-    derivatives = step.sums(step.with_parameters(found, base), x, t)
+    derivatives = step_sums.sums(step_sums.with_parameters(found, base), x, t)
     slope = sum(float(np.sum(derivatives[name] * moved[name])) for name in base)
     h = 2.0**-12
     assert abs((loss(h) - loss(-h)) / (2 * h) - slope) <= 1e-5
@@ -102,7 +102,7 @@ def test_a_network_against_the_backward_pass_by_hand(
     x, t = random.uniform(-1, 1, (n, widths[0])), random.uniform(0, 1, (n, widths[-1]))
     loss, want = train.loss_and_gradients(network, x, t)
     lowered = lower_step(widths, omega_0_first, omega_0_hidden, n, activation)
-    found = step.sums(step.with_parameters(lowered, arrays_of(network)), x, t)
+    found = step_sums.sums(step_sums.with_parameters(lowered, arrays_of(network)), x, t)
     largest = max(omega_0_first, omega_0_hidden)
     gain = np.prod([1 + np.abs(w).sum() * largest + np.abs(b).sum() for w, b in layers(network)])
     operations = 4 * (sum(widths) + n * widths[-1] + 8 * len(widths))

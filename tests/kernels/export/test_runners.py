@@ -8,13 +8,14 @@ from dataclasses import asdict, replace
 
 import numpy as np
 import pytest
+from errors_at import encoding_errors
 from kit import encoded
 
 from wamnet import kernels
 from wamnet.compiler.compile import compile_program
 from wamnet.compiler.core.ir import Gather, Image, Type
 from wamnet.compiler.core.trace import trace
-from wamnet.compiler.scenes.encode_kernel import compile_encode, error_at, layers_of
+from wamnet.compiler.scenes.encode_kernel import compile_encode, layers_of
 from wamnet.compiler.scenes.lower_scene import lower_scene
 from wamnet.compiler.scenes.path_kernel import compile_path
 from wamnet.compiler.scenes.scene_inputs import varying
@@ -206,7 +207,7 @@ def test_encoding_keeps_its_bound(runner, traced):
         pytest.skip("its encodings are parts of its paths' passes: test_exports.py runs them")
     kernel, sums = compile_encode(FEATURES, Normalization(), runner.name), traced[2]
     planes = dict(zip(kernel.planes, sums, strict=True))
-    bound, found = error_at(kernel, planes, 1), encoded(runner, kernel, sums, 1)
+    bound, found = encoding_errors(kernel, planes, 1), encoded(runner, kernel, sums, 1)
     layers = {
         name: np.moveaxis(sums[3 * i : 3 * i + 3], 0, -1).astype(np.float64)
         for i, name in enumerate(FEATURES)
@@ -269,7 +270,7 @@ def test_c_is_clean_under_warnings_and_sanitizers(traced, tmp_path):
         pytest.skip(str(error))
     printed = subprocess.run(["./main"], cwd=tmp_path, check=True, capture_output=True, text=True).stdout
     found = np.array([float.fromhex(line) for line in printed.split()]).reshape(part.rows, part.width, 3)
-    bound = error_at(encoder, dict(zip(encoder.planes, sums, strict=True)), 1)["color"]
+    bound = encoding_errors(encoder, dict(zip(encoder.planes, sums, strict=True)), 1)["color"]
     color = np.moveaxis(sums[:3], 0, -1).astype(np.float64)
     held = encode_sums({"color": color}, 1.0, ("color",), Normalization())["color"]
     # The compiler keeps the interpreter's order of operations, without contraction: the sums are its bits.

@@ -11,7 +11,7 @@
 
 import hashlib
 import json
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from functools import partial
@@ -24,7 +24,6 @@ from ...kernels import Pipeline, open_executor, render_on
 from ...kernels.run import before as past
 from ...kernels.run import render_frame
 from ...kernels.run.denoise_on import Denoiser
-from ...kernels.run.pipeline import Drawn
 from ...kernels.run.render_on import Frames
 from ...models.data.frame_plan import animation_times
 from ...models.data.scene_source import scene_source
@@ -251,28 +250,16 @@ def draw_frames(shots: Sequence[Shot], watch: Watch, denoiser: Denoiser, rendere
         moving=scenes,
         feature_spp=first.noisy.feature_spp,
     ) as pipeline:
-        before: Callable[[], None] | None = None
-        for shot in shots:
-            pipeline.set_scene(shot.scene)
-            pipeline.draw(shot.noisy.seed)
-            drawn, frame = pipeline.later(*dict.fromkeys(("color", *watch.features))), None
+        features = tuple(dict.fromkeys(("color", *watch.features)))
+        # A picture is written while the device draws the next one.
+        pictures = pipeline.stream(scenes, [shot.noisy.seed for shot in shots], features=features)
+        for shot, drawn in zip(shots, pictures, strict=True):
+            frame = None
             if shot.reference:
                 frame = render_on(device, shot.scene, shot.reference, frames=frames).frame
-            # The picture before is written while the device draws this one.
-            if before is not None:
-                before()
-                yield
-            before = partial(_write_drawn, shot, watch, drawn, frame)
-        if before is not None:
-            before()
+            watch.see_images(shot.path.name, drawn.images)
+            write_shot(shot, model, drawn.images["color"], drawn.picture, frame)
             yield
-
-
-def _write_drawn(shot: Shot, watch: Watch, drawn: Callable[[], Drawn], reference: Frame | None) -> None:
-    """Write a picture that a pipeline has drawn, when it is there, and measure its features."""
-    found = drawn()
-    watch.see_images(shot.path.name, found.images)
-    write_shot(shot, watch.model, found.images["color"], found.picture, reference)
 
 
 def write_shot(shot: Shot, model: Model, noisy: Any, denoised: Any, reference: Frame | None) -> None:

@@ -199,13 +199,15 @@ class Pipeline(Closing):
         images = {feature: self.passes.read(feature) for feature in features}
         return lambda: Drawn(picture(), {name: self._meant(image()) for name, image in images.items()})
 
-    def stream(self, scenes: Iterable[Scene], seeds: Iterable[int], spp: int = 1) -> Iterator[Drawn]:
-        """Yield the picture of each scene with its seed, in order; one more is being drawn meanwhile."""
+    def stream(
+        self, scenes: Iterable[Scene], seeds: Iterable[int], spp: int = 1, features: Sequence[str] = ()
+    ) -> Iterator[Drawn]:
+        """Yield the picture of each scene with its seed, with feature images; the next is drawn meanwhile."""
         before: Callable[[], Drawn] | None = None
         for scene, seed in zip(scenes, seeds, strict=True):
             self.set_scene(scene)
             self.draw(seed, spp)
-            now = self.later()
+            now = self.later(*features)
             if before is not None:
                 yield before()
             before = now

@@ -125,10 +125,11 @@ def test_pictures_of_a_stream_come_in_order(executor, model):
     """Each while the next one is drawn: what is yielded is not overwritten."""
     shots = [cubes(time) for time in TIMES]
     with Pipeline(executor, shots[0], model, SIZE, settings=SETTINGS, moving=shots) as pipeline:
-        found = [drawn.picture for drawn in pipeline.stream(shots, range(len(shots)))]
-        for seed, (scene, picture) in enumerate(zip(shots, found, strict=True)):
+        found = list(pipeline.stream(shots, range(len(shots)), features=("normal",)))
+        for seed, (scene, drawn) in enumerate(zip(shots, found, strict=True)):
             pipeline.set_scene(scene)
-            assert np.array_equal(picture, pipeline.run(seed))
+            assert np.array_equal(drawn.picture, pipeline.run(seed))
+            assert np.array_equal(drawn.images["normal"], pipeline.image("normal"))
         assert list(pipeline.stream([], [])) == []
         with pytest.raises(ValueError, match="shorter"):
             list(pipeline.stream(shots, [1]))

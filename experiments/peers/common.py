@@ -52,6 +52,14 @@ def told_as_missing(name: str) -> Iterator[None]:
         raise ExecutorUnavailable(f"{name} cannot run here: {lines[0]}") from error
 
 
+def activation_in(library: str, table: Mapping[str, Any], model: Model) -> Any:
+    """Return what a library has for the model's activation, from a table by the names of activations."""
+    name = model.siren.activation
+    if name not in table:
+        raise ExecutorUnavailable(f"{library} has no implementation of {name}, only of {', '.join(table)}")
+    return table[name]
+
+
 def layered(model: Model, fuses: bool) -> tuple[Stage, ...]:
     """Return the stages of a library that runs a network layer by layer, each reading and writing memory.
 

@@ -19,13 +19,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wamnet.compiler.core import sine
-from wamnet.kernels.bench.contenders import Opened, Tools, activation_in
+from wamnet.kernels.bench.contenders import Opened, Tools
 from wamnet.kernels.bench.workload import Given
 from wamnet.refimpl.network.activation import RELU, SINE
 from wamnet.refimpl.network.dataset import FEATURES
 from wamnet.refimpl.network.denoise import Model
 
-from .common import Peer, layered, told_as_missing
+from .common import Peer, activation_in, layered, told_as_missing
 
 BLOCK = 12
 """Pixels whose sums are in registers: with 32 neurons 24 registers of 16 numbers."""

@@ -14,13 +14,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from wamnet.kernels.bench.contenders import Opened, Tools, activation_in
+from wamnet.kernels.bench.contenders import Opened, Tools
 from wamnet.kernels.bench.workload import Given
 from wamnet.refimpl.errors import ExecutorUnavailable
 from wamnet.refimpl.network.activation import RELU, SINE
 from wamnet.refimpl.network.denoise import Model
 
-from .common import Peer, layered, told_as_missing
+from .common import Peer, activation_in, layered, told_as_missing
 
 LOADER_VARIABLE = "OPENCL_PATH"
 """Environment variable that names the loader to tinygrad."""

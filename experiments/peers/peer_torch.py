@@ -16,14 +16,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from wamnet.kernels.bench.contenders import NO_CACHE, Opened, Tools, activation_in
+from wamnet.kernels.bench.contenders import NO_CACHE, Opened, Tools
 from wamnet.kernels.bench.workload import Given
 from wamnet.refimpl.network.activation import RELU, SINE
 from wamnet.refimpl.network.denoise import Model
 from wamnet.refimpl.network.siren import Siren
 from wamnet.refimpl.network.train import Recipe
 
-from .common import Peer, layered, told_as_missing
+from .common import Peer, activation_in, layered, told_as_missing
 
 MODES = {"clamp": "replicate", "zero": "constant"}
 """Border rules as modes of `torch.nn.functional.pad`."""

@@ -11,7 +11,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass
 from fnmatch import fnmatchcase
@@ -93,14 +93,6 @@ class Variant:
             "parameters": parameters_of(found, self.rank),
             "trained_steps": self.steps or None,
         }
-
-
-def activation_in(library: str, table: Mapping[str, Any], model: Model) -> Any:
-    """Return what a library has for the model's activation, from a table by the names of activations."""
-    name = model.siren.activation
-    if name not in table:
-        raise ExecutorUnavailable(f"{library} has no implementation of {name}, only of {', '.join(table)}")
-    return table[name]
 
 
 def parameters_of(model: Model, rank: int = 0) -> int:

@@ -72,7 +72,7 @@ def _is_folder(output: Path) -> bool:
     return not output.suffix or (output.suffix.lower() not in (".exr", ".png") and output.is_dir())
 
 
-def outputs_of(frames: Sequence[Path], output: Path, suffix: str = ".exr") -> list[Path]:
+def outputs_of(frames: Sequence[Path], output: Path) -> list[Path]:
     """Return the file of each frame's result; refuse names that meet each other or a frame."""
     if not is_many(frames, output):
         return [output]
@@ -81,7 +81,7 @@ def outputs_of(frames: Sequence[Path], output: Path, suffix: str = ".exr") -> li
         texts = [str(number).rjust(digits, "0") for number in _frame_numbers(frames, output)]
         outputs = [output.with_name(NUMBER.sub(text, output.name, count=1)) for text in texts]
     elif _is_folder(output):
-        outputs = [output / f"{frame.stem}{suffix}" for frame in frames]
+        outputs = [output / f"{frame.stem}.exr" for frame in frames]
     else:
         rule = f"{len(frames)} frames need a folder, or a pattern with their numbers"
         raise InputError("output", str(output), rule, f"for example -o out or -o out/{output.stem}.%04d.exr")

@@ -41,9 +41,9 @@ def numbers(array: NDArray[np.float32], vector: int) -> tree.Expr:
     return stack([const(float(value)) for value in held + [0.0] * (4 - len(held))])
 
 
-def variables(names: Sequence[str], value: tree.Expr, kind: tree.Type = VECTOR) -> list[tree.Array]:
+def variables(names: Sequence[str], value: tree.Expr) -> list[tree.Array]:
     """Return variables with one first value."""
-    return [tree.Array(each, kind, kept=True, value=value, register=True) for each in names]
+    return [tree.Array(each, VECTOR, kept=True, value=value, register=True) for each in names]
 
 
 class Straight(Stored):

@@ -81,9 +81,10 @@ def _open(tools: Tools, model: Model, size: int) -> Opened:
     by_size: dict[int, Any] = {}
 
     def run(given: Given) -> NDArray[np.float32]:
-        if given.pixels not in by_size:
-            by_size[given.pixels] = _network(model)
-        function, on_device = by_size[given.pixels]
+        pixels = given.frame.height * given.frame.width
+        if pixels not in by_size:
+            by_size[pixels] = _network(model)
+        function, on_device = by_size[pixels]
         images = [on_device(image) for image in given.images.values()]
         found: NDArray[np.float32] = function(*images).numpy()
         return found

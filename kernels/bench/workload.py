@@ -52,11 +52,6 @@ class Given:
         """Return the images as networks of integers read them."""
         return {name: round_image(image) for name, image in self.images.items()}
 
-    @property
-    def pixels(self) -> int:
-        """Return the number of pixels."""
-        return self.frame.height * self.frame.width
-
 
 def paper_model(
     features: Sequence[str] = FEATURES, size: int = 12, hidden: Sequence[int] = HIDDEN, **scales: Any

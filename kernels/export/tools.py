@@ -93,9 +93,9 @@ def spirv(source: str, language: str = "glsl") -> bytes:
         return (folder / "kernel.spv").read_bytes()
 
 
-def validate(folder: Path, name: str, environment: str = ENVIRONMENT) -> None:
+def validate(folder: Path, name: str) -> None:
     """Refuse SPIR-V that is not valid."""
-    run("spirv-val", "--target-env", environment, name, folder=folder)
+    run("spirv-val", "--target-env", ENVIRONMENT, name, folder=folder)
 
 
 def hlsl(source: str, style: str) -> str:

@@ -32,7 +32,7 @@ from ...compiler.core.ir import Type
 from ...compiler.core.passes import pipeline
 from ...compiler.core.trace import trace
 from ...compiler.proof import ranges
-from ...compiler.proof.ranges import Arithmetic, Range
+from ...compiler.proof.ranges import Range
 from ...compiler.scenes.emit_path import END, planes
 from ...compiler.scenes.lower_scene import PASSES, PATH, SURFACE, PathPrograms, lower_scene
 from ...compiler.scenes.path_kernel import compile_path
@@ -170,7 +170,6 @@ def compare_paths(
     settings: Settings,
     view: View,
     *,
-    arithmetic: Arithmetic = ranges.PROMISED,
     build: Build = kernel_of_states,
     on_progress: Callable[[int], None] | None = None,
 ) -> PathReport:
@@ -185,7 +184,7 @@ def compare_paths(
     depths, examples = [], list[Unexplained]()
     own = _Paths(open_executor("numpy"), programs, view, kernel_of_states).states()
     for depth, after in enumerate(_Paths(device, programs, view, build).states()):
-        step = _Step(programs, arithmetic, depth, given, before, after)
+        step = _Step(programs, depth, given, before, after)
         verdict = _judge(step, view)
         examples += verdict.examples[: SHOWN - len(examples)]
         together, moved = _moved(after, next(own), together)
@@ -260,7 +259,6 @@ class _Step:
     """The step from the kernel's state `before` (None: from the camera) to its state `after`, at `depth`."""
 
     programs: PathPrograms
-    arithmetic: Arithmetic
     depth: int
     given: State
     before: State | None
@@ -281,14 +279,14 @@ class _Step:
         """Return the range of each component of the state `after`."""
         parts = self.programs.parts
         if self.before is None:
-            sent = ranges.evaluate(parts["start"], self.given, self.arithmetic, guided)
+            sent = ranges.evaluate(parts["start"], self.given, ranges.PROMISED, guided)
             sent["alive"] = Range(np.True_, np.True_, np.True_)
         else:
             depth = np.full(len(self.given["x"]), self.depth - 1, np.uint32)
             inputs = {**self.given, **self.before, "depth": depth}
-            sent = ranges.evaluate(parts["scatter"], inputs, self.arithmetic, guided)
+            sent = ranges.evaluate(parts["scatter"], inputs, ranges.PROMISED, guided)
         gathered = {name: sent[name] for name in QUANTITIES["radiance"]}
-        arrived = ranges.evaluate(parts["arrive"], {**self.after, **gathered}, self.arithmetic, guided)
+        arrived = ranges.evaluate(parts["arrive"], {**self.after, **gathered}, ranges.PROMISED, guided)
         # A path that ends keeps what its last scattering has gathered.
         alive = self.after["alive"]
         kept = {name: ranges.where(alive, arrived[name], gathered[name]) for name in gathered}

@@ -278,17 +278,13 @@ class Measurement:
     def curve(
         self,
         names: Sequence[str],
-        schedules: Sequence[str] = (),
         repeats: int = REPEATS,
         on_done: Done = lambda share: None,
     ) -> Curve:
-        """Return the points of variants; `on_done` gets each variant's share.
-
-        `schedules`: which to measure; by default those that may be fast.
-        """
+        """Return the points of variants under schedules that may be fast; `on_done` gets each one's share."""
         model = self.model
         pictures = [denoise(model, noisy, np.float64) for noisy, _ in self.pairs]
-        chosen = tuple(schedules) or self.promising()
+        chosen = self.promising()
         numbers = noise(self._plan().analysed, self.size)
         points: dict[str, Point] = {}
         ways: dict[str, Callable[[], object]] = {}

@@ -419,11 +419,15 @@ def _packed(array: NDArray[Any], kind: str = "<f4") -> str:
 
 
 ZIG_OPTIONS = (
-    "-target", "wasm32-wasi", "-mcpu=generic+simd128", "-mexec-model=reactor", "-std=gnu99", "-O3",
-    "-ffp-contract=off", "-nostartfiles", "-Wl,--strip-all", "-Wl,--export=wamnet_rows",
-    "-Wl,--export=__heap_base",
+    "-target", "wasm32-wasi", "-mcpu=generic+simd128", "-std=gnu99", "-O3", "-ffp-contract=off",
 )  # fmt: skip
-"""No start, no file, no debugging: a page needs one function."""
+"""Vectors, and no contraction."""
+
+LINK_OPTIONS = (
+    "-nostdlib", "-Wl,--no-entry", "-Wl,--strip-all", "-Wl,--export=wamnet_rows", "-Wl,--export=__heap_base",
+)  # fmt: skip
+"""No start, no file, no debugging: a page needs one function. No C library, which Zig would build first, in
+half a minute."""
 
 
 def compiler() -> list[str]:
@@ -448,13 +452,16 @@ def module_of(artifact: Artifact) -> bytes:
             folder = Path(name)
             (folder / "denoise.h").write_text(artifact.source, encoding="utf-8")
             (folder / "page.c").write_text(glue, encoding="utf-8")
-            done = subprocess.run(
-                [*command, "cc", *ZIG_OPTIONS, "-o", "page.wasm", "page.c"],
-                cwd=folder, capture_output=True, text=True, check=False, errors="replace",
-            )  # fmt: skip
-            if done.returncode:
-                raise CompileError(f"zig: {done.stderr.strip()[:MOST_TOLD] or 'no module'}; update ziglang")
+            for step in (("-c", "-o", "page.o", "page.c"), (*LINK_OPTIONS, "-o", "page.wasm", "page.o")):
+                done = subprocess.run(
+                    [*command, "cc", *ZIG_OPTIONS, *step],
+                    cwd=folder, capture_output=True, text=True, check=False, errors="replace",
+                )  # fmt: skip
+                if done.returncode:
+                    told = done.stderr.strip()[:MOST_TOLD] or "no module"
+                    raise CompileError(f"zig: {told}; update ziglang")
             return base64.b64encode((folder / "page.wasm").read_bytes()).decode()
 
     version = subprocess.run([*command, "version"], capture_output=True, text=True, check=False).stdout
-    return base64.b64decode(cache.kept("webassembly", [version, *ZIG_OPTIONS, artifact.source, glue], built))
+    given = [version, *ZIG_OPTIONS, *LINK_OPTIONS, artifact.source, glue]
+    return base64.b64decode(cache.kept("webassembly", given, built))

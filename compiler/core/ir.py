@@ -63,7 +63,9 @@ class Node:
     places: tuple[str, ...] = field(default=(), compare=False, repr=False)
 
     def on(self, args: tuple[int, ...], kind: Type | None = None) -> Node:
-        """Return the operation on other operands."""
+        """Return the operation on other operands; itself where they are its own."""
+        if args == self.args and kind in (None, self.type):
+            return self
         return Node(self.op, args, kind or self.type, self.attributes, self.places)
 
     def __getitem__(self, name: str) -> Attribute:
@@ -182,7 +184,7 @@ class Builder:
     def add(self, node: Node) -> int:
         """Return the index of `node`, which is appended unless it is there already."""
         # repr tells 0.0 from -0.0, which compare equal but divide differently.
-        key = (node.op, node.args, node.type, repr(node.attributes))
+        key = (node.op, node.args, node.type, node.attributes and repr(node.attributes))
         if key not in self._numbers:
             self._numbers[key] = len(self.nodes)
             if not node.places and (places := self.where()):

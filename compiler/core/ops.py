@@ -64,6 +64,12 @@ FLOATS = ("float32",)
 NUMBERS = ("float32", "int32", "uint32")
 """Operands that may be any numbers."""
 
+RANGES = {"int32": (-(2**31), 2**31 - 1), "uint32": (0, 2**32 - 1)}
+"""The least and the largest integer of each kind."""
+
+LARGEST = float(np.finfo(np.float32).max)
+"""The largest finite number of float32."""
+
 # ---- type rules: (operand types, attributes, parameters) -> type -------------------------------------
 
 
@@ -79,13 +85,13 @@ def _constant(args: Sequence[Type], attributes: Mapping[str, Attribute], paramet
     """A constant is one finite float, or by its `dtype` an integer in its range or a boolean."""
     value, dtype = attributes["value"], str(attributes.get("dtype", "float32"))
     if dtype in ("int32", "uint32"):
-        info = np.iinfo(dtype)
-        if type(value) is not int or not info.min <= value <= info.max:
+        low, high = RANGES[dtype]
+        if type(value) is not int or not low <= value <= high:
             raise TypeRuleError(f"a constant must be an integer that {dtype} holds, not {value!r}")
     elif dtype == "bool":
         if type(value) is not bool:
             raise TypeRuleError(f"a constant must be True or False, not {value!r}")
-    elif not isinstance(value, float) or not abs(value) <= float(np.finfo(np.float32).max):
+    elif not isinstance(value, float) or not abs(value) <= LARGEST:
         raise TypeRuleError(f"a constant must be a float that is finite in float32, not {value!r}")
     return Type(dtype)
 

@@ -54,7 +54,8 @@ def _folded(program: Program, kind: np.dtype[Any]) -> Program:
 
     def rule(builder: Builder, node: Node, args: tuple[int, ...]) -> int | None:
         if node.op == "constant" and node.type.dtype == "float32":
-            return constant_of(builder, kind.type(node["value"]), "float32")
+            value = float(kind.type(node["value"]))
+            return None if node.attributes == (("value", value),) else constant_of(builder, value, "float32")
         operands = [builder.nodes[arg] for arg in args]
         constants: Known = [each["value"] if each.op == "constant" else None for each in operands]  # type: ignore[misc]
         number = not node.type.shape and (OPS[node.op].elementwise or node.op == "take")

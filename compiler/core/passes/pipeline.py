@@ -32,12 +32,14 @@ COMMON = ("fold", "fuse_bias", "eliminate_dead")
 
 
 def run(program: Program, names: Sequence[str], when: str = "before the passes") -> Program:
-    """Return the program after the named passes, verified at every step."""
+    """Return the program after the named passes, verified after each that changes it."""
     verify(program, when)
     for name in names:
         if name not in PASSES:
             raise CompileError(f"pass {name!r}: unknown ({choice(name, PASSES)})")
-        program = verify(PASSES[name](program), f"after pass {name}")
+        changed = PASSES[name](program)
+        if changed is not program:
+            program = verify(changed, f"after pass {name}")
     return program
 
 

@@ -18,6 +18,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
+from operator import is_
 
 import numpy as np
 
@@ -31,7 +32,7 @@ Rule = Callable[[Builder, Node, tuple[int, ...]], int | None]
 
 
 def rewrite(program: Program, rule: Rule) -> Program:
-    """Return the program with `rule` applied to every node, operands first."""
+    """Return the program with `rule` applied to every node, operands first; itself if no node is another."""
     builder = Builder()
     builder.parameters.update(program.parameters)
     moved: list[int] = []
@@ -40,6 +41,8 @@ def rewrite(program: Program, rule: Rule) -> Program:
         builder.places = node.places
         index = rule(builder, node, args)
         moved.append(builder.add(node.on(args)) if index is None else index)
+    if len(builder.nodes) == len(program.nodes) and all(map(is_, builder.nodes, program.nodes)):
+        return program
     outputs = tuple((name, moved[index]) for name, index in program.outputs)
     return replace(program, nodes=tuple(builder.nodes), outputs=outputs)
 
@@ -147,7 +150,7 @@ def _joined(builder: Builder, numbers: tuple[int, ...], kind: Type) -> int:
 
 
 def eliminate_dead(program: Program) -> Program:
-    """Return the program with only the nodes and parameters that its outputs depend on."""
+    """Return the program with only the nodes and parameters that its outputs depend on; itself with all."""
     live = {index for _, index in program.outputs}
     for index in reversed(range(len(program.nodes))):
         if index in live:
@@ -158,4 +161,6 @@ def eliminate_dead(program: Program) -> Program:
     outputs = tuple((name, moved[index]) for name, index in program.outputs)
     used = {str(name) for node in nodes for key, name in node.attributes if key in OPS[node.op].parameters}
     parameters = {name: array for name, array in program.parameters.items() if name in used}
+    if len(nodes) == len(program.nodes) and len(parameters) == len(program.parameters):
+        return program
     return replace(program, nodes=nodes, outputs=outputs, parameters=parameters)

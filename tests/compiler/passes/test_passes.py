@@ -213,3 +213,11 @@ def test_a_pass_that_breaks_the_program_is_named(monkeypatch):
     monkeypatch.setitem(pipeline.PASSES, "fold", lambda program: replace(program, outputs=()))
     with pytest.raises(CompileError, match=r"after pass fold: outputs are \[\]"):
         pipeline.run(traced(lambda x: x), ["fold"])
+
+
+@pytest.mark.parametrize("name", [*pipeline.PASSES])
+def test_a_program_that_a_pass_leaves_is_not_copied(name):
+    """A second run changes nothing: it returns the program itself, which is not verified again."""
+    names = ("fold", "fold_float32", name, "fold", "fold_float32", "eliminate_dead")
+    once = pipeline.run(traced(lambda x: np.sin(x) * W[0] + B), names)
+    assert pipeline.run(once, names[3:]) is once

@@ -20,8 +20,8 @@ from .lanes import Unread, Wrong
 from .places import TILE, Place
 from .terms import Term
 
-NOBODY, ADDED = -1, -2
-"""Instead of the number of a turn that has written an element: none has, or several add to it."""
+NOBODY, ADDED, AGAIN = -1, -2, -3
+"""Instead of the number of a turn that has written an element: none has, or all add to it, once or again."""
 
 EMPTY, SHAPE, SUM, BOTH = range(4)
 """What an element holds: nothing, a shape, a sum on its way, or both of them."""
@@ -70,7 +70,7 @@ class Turns:
         """
         _, owner, reads = self.users(cells)
         before = owner[element]
-        if (before == ADDED).any():
+        if ((before == ADDED) | (before == AGAIN)).any():
             raise Race
         last = np.maximum(before, who)
         owner[element] = last
@@ -81,14 +81,17 @@ class Turns:
             raise Race
         return before <= who
 
-    def added(self, cells: Cells, element: Any) -> None:
-        """Note elements that all turns add to once; `Race` where one has used these, or they added before."""
+    def added(self, cells: Cells, element: Any, again: bool) -> None:
+        """Note elements that all turns add to; `Race` where one has used these.
+
+        `again`: of which they may add several, products or integers; others, such as partial sums, would be
+        between those of other turns.
+        """
         _, owner, reads = self.users(cells)
-        if element.size and (
-            (owner[element] != NOBODY).any() or any(np.isin(element, own).any() for own, _ in reads)
-        ):
+        used = ((owner[element] != NOBODY) & ((owner[element] != AGAIN) | (not again))).any()
+        if element.size and (used or any(np.isin(element, own).any() for own, _ in reads)):
             raise Race
-        owner[element] = ADDED
+        owner[element] = AGAIN if again else ADDED
 
     def save(self, cells: Cells) -> None:
         """Keep what an array holds, in case that the turns race."""
@@ -112,7 +115,8 @@ class Turns:
             if cells.columns < outer.count:
                 element = np.flatnonzero(owner > NOBODY)
                 outer.written(cells, element, owner[element] // of)
-                outer.added(cells, np.flatnonzero(owner == ADDED))
+                outer.added(cells, np.flatnonzero(owner == ADDED), False)
+                outer.added(cells, np.flatnonzero(owner == AGAIN), True)
                 for element, who in reads:
                     outer.read(cells, element, who // of)
         if outer.undoes:

@@ -23,7 +23,7 @@ from numpy.typing import NDArray
 
 from ..proof.evidence import inputs_of
 from ..proof.integer_checker import check_integers, ranges
-from .field import P, drawn, hashed
+from .field import P, Words, drawn, hashed
 from .lanes import Unread, Wrong
 from .terms import Span, Term, aligned, constant, expression, known_floats, known_integers, stacked
 
@@ -68,6 +68,18 @@ def operate(what: str, a: Term, b: Term, wrong: Wrongs) -> Term:
     if not both.all() or beyond.any():
         return Term(shape, kind=kind)
     return Term(shape, aligned(np.add, a.sums, b.sums) % P, kind=kind, span=(low, high))
+
+
+def added(read: Term, number: Term, total: Words, parts: Callable[[Any], Any]) -> Term | None:
+    """Return what turns add to an integer that was read; None if a sum of some may leave int32."""
+    if number.span is None or read.span is None or not (number.span[0] <= number.span[1]).all():
+        return None
+    low, high = map(parts, number.span)
+    reach = np.maximum(np.abs(low), np.abs(high)).sum(axis=-1).max() + np.abs(read.span).max()
+    if not (read.span[0] <= read.span[1]).all() or reach > LIMITS["int32"][1]:
+        return None
+    span = low.sum(axis=-1), high.sum(axis=-1)
+    return Term(hashed("sum", *total), total, kind=number.kind, span=span)
 
 
 # ---- conversions ------------------------------------------------------------------------------------------

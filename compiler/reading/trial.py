@@ -41,7 +41,7 @@ from ..kernel.verify import STEPS
 from .cells import Cells, Device, Race, Shared, Slice, Turns
 from .claim import Claim
 from .field import P, Words, hashed
-from .integers import Stored
+from .integers import Stored, added
 from .lanes import Unread, Wrong
 from .places import NOTHING, TILE, Place, corner
 from .terms import Term, constant, vanishing
@@ -171,7 +171,8 @@ class Trial(Values):
         if statement.add:
             away = value.op == "negative"
             number = self.value(value.args[0] if away else value)
-            if not away and self._added(statement.array, index, kind, number):
+            product = value.op == "multiply"
+            if not away and self._added(statement.array, index, kind, number, product):
                 return
             read = self._load(statement.array, index, kind)
             total = self.operate("subtract" if away else "add", read, number)
@@ -179,24 +180,35 @@ class Trial(Values):
         else:
             self._put(statement.array, index, kind, self.value(value))
 
-    def _added(self, array: str, index: Sequence[Any], kind: Type, number: Any) -> bool:
+    def _added(self, array: str, index: Sequence[Any], kind: Type, number: Any, product: bool) -> bool:
         """Add sums of all turns at once to a number that all of them add to; return whether this was done.
 
-        Sums of some turns are left out: where one is the program's, that of all is not.
+        Sums of some turns are left out: where one is the program's, that of all is not. No sum of integers in
+        any order may leave int32.
         """
-        turns, sums = self.turns, number.sums if isinstance(number, Term) and number.shape is None else None
+        turns, whole = self.turns, isinstance(number, Term) and number.kind == "int32"
+        sums = number.sums if isinstance(number, Term) and (whole or number.shape is None) else None
         if sums is None or self.mask is not None or self.dual or vanishing(number, number, "add").any():
             return False
         cells, place = self._place_of(array, index, kind)
         if not isinstance(cells, Cells) or np.size(place) > 1 or cells.columns == turns.count:
             return False
+
+        def parts(a: Any) -> Any:
+            """Return what the turns inside each turn of the sum's own add to it, along the last axis."""
+            return np.broadcast_to(a, (*a.shape[:-1], turns.count)).reshape(*a.shape[:-1], cells.columns, -1)
+
+        total = parts(sums % P).sum(axis=-1)
+        self.turns = Turns(cells.columns)
+        read = self._load(array, index, kind)
+        term = added(read, number, total, parts) if whole else Term(None, total)
+        if term is None:
+            self.turns = turns
+            return False
         rows = np.arange(kind.lanes)[:, None] + place
         turns.save(cells)
-        turns.added(cells, rows * cells.columns + np.arange(cells.columns))
-        each = np.broadcast_to(sums % P, (*sums.shape[:-1], turns.count))
-        total = each.reshape(*sums.shape[:-1], cells.columns, -1).sum(axis=-1)
-        self.turns = Turns(cells.columns)
-        self._put(array, index, kind, self.operate("add", self._load(array, index, kind), Term(None, total)))
+        turns.added(cells, rows * cells.columns + np.arange(cells.columns), product or whole)
+        self._put(array, index, kind, self.operate("add", read, term))
         self.turns = turns
         return True
 

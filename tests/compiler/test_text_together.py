@@ -134,9 +134,10 @@ def test_turns_inside_turns_have_used_what_these_use():
     [
         get,
         lambda cells, turns, place: put(cells, turns, place, 1, 2),
-        lambda cells, turns, place: turns.added(cells, np.array(place)),
+        lambda cells, turns, place: turns.added(cells, np.array(place), False),
+        lambda cells, turns, place: turns.added(cells, np.array(place), True),
     ],
-    ids=["read", "write", "add"],
+    ids=["read", "write", "add", "add a product"],
 )
 @pytest.mark.parametrize("ordered", [True, False])
 def test_what_turns_add_to_they_do_not_use(inside, first, use, ordered):
@@ -147,7 +148,7 @@ def test_what_turns_add_to_they_do_not_use(inside, first, use, ordered):
 
     def add():
         turns = Turns(4) if inside else outer
-        turns.added(cells, np.array([0]))
+        turns.added(cells, np.array([0]), False)
         if inside:
             turns.end(outer)
 

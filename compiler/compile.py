@@ -34,6 +34,7 @@ from .languages.listing import listed
 from .languages.renderer import Renderer
 from .plan import Bound, Plan, plan_program
 from .proof import bounds, certificate
+from .proof.evidence import AGAINST
 from .proof.whole import has_one_zero
 from .schedules.common import kernel_gather, output_channels
 from .schedules.factor import HORIZONTAL, Cut, left
@@ -44,12 +45,6 @@ from .variants import variation
 KEPT_INFO = ("normalization", "recipe", "steps_done", "data_digest", "trained_on_scene")
 """What of a model's info a manifest repeats: how to encode images, and where the weights come from."""
 
-
-AGAINST = "float64 reference, same float32 weights and images"
-"""What a bound compares a kernel with."""
-
-AGAINST_WHOLE = "reference in integers, the same bits"
-"""The same for a kernel in which nothing rounds."""
 
 WHOLE_SINE = "a polynomial of degree 5 in products and shifts of words"
 """What a header says of the sine of integers."""
@@ -173,7 +168,7 @@ def _report(cut: Cut) -> Mapping[str, Any]:
 
 def _joined(before: Artifact, found: Artifact, report: Mapping[str, Any], cut: Cut) -> Artifact:
     """Return both passes as one artifact, whose manifest holds the first one's."""
-    bound = {**found.manifest["bound"], "against": "float64 reference of the program that was cut"}
+    bound = {**found.manifest["bound"], "against": AGAINST[2]}
     proven = found.certificate
     if proven:
         total = {**proven["bound"], "against": bound["against"]}
@@ -276,7 +271,7 @@ def _facts(plan: Plan, bound: Bound, weights: NDArray[np.float32]) -> dict[str, 
         },
         "bound": {
             "output": bound.output and [round_up(error) for error in bound.output],
-            "against": AGAINST_WHOLE if bound.exact else AGAINST,
+            "against": AGAINST[bound.exact],
         },
         "certificate": artifact.CERTIFICATE_NAME if bound.proof or bound.exact else None,
         "sine_arguments": [[_finite(-round_up(-low)), _finite(round_up(high))] for low, high in bound.sines],

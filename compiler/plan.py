@@ -182,10 +182,9 @@ class Plan:
         errors = bounds.output_errors(program, found)[program.outputs[0][0]]
         if not all(math.isfinite(error) for error in errors):
             return Bound(None, tuple(ranges))
-        proof, cut = None, None
-        if self.proves and self.cut:
-            cut = self.passes[0].bound.proof and (self.cut.horizontal, self.cut.vertical)
-        if self.proves and (cut or not self.cut):
+        proof = None
+        cut = (self.cut.horizontal, self.cut.vertical) if self.cut else None
+        if self.proves:
             from .proof import certificate
 
             of = None if cut else self.schedule.spectra(program)

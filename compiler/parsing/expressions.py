@@ -35,7 +35,8 @@ class Expressions(Reader):
             numbers.append(self._expression())
             if self._now():
                 self._take(",")
-        values = np.float32([each.value if each.op == "const" else np.nan for each in numbers])
+        floats = [each.value if (each.op, each.type) == ("const", FLOAT) else np.nan for each in numbers]
+        values = np.array(floats, np.float32)
         if home == "inline" and values.tobytes() != weights.tobytes():
             raise OtherWeights("weights in its table are not those of weights.bin")
 

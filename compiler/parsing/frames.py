@@ -55,15 +55,15 @@ OPEN: Mapping[str, str] = {
     "vector": r"(?P<vector>(?:float|int)(?:2|4|8|16)|wamnet_vector|i?vec4|vec4<[fi]32>)",
     "same_vector": r"(?P=vector)",
     "shared": r"(?P<shared>float|int|f32|i32)",
-    "lanes": r"(?P<lanes>\d+)", "same_lanes": r"(?P=lanes)",
+    "lanes": r"(?P<lanes>[1-9]\d*)", "same_lanes": r"(?P=lanes)",
     "dropped": r"(?:#undef wamnet_(?:difference|scaled|sum|zero)\n)*",
     "body": r"(?P<body>.*\n)?",
     "memory": r"(?P<memory>(?:[^\n]*(?:vec|float)2\b[^\n]*\n)+)",
     "head": r"(?P<head>",
     "launches": r"(?P<launches>.*)",
     "argued": r"(?P<argued>)", "constant": r"(?P<constant>)",
-    "table": r"weights\[(?P<count>\d+)\] = \{\n(?P<table>[^{};]*)\};",
-    "fours": r"(?P<fours>\d+)", "quads": r"(?P<quads>\d+)",
+    "table": r"weights\[(?P<count>[1-9]\d*)\] = \{\n?(?P<table>[^{};]*)\};",
+    "fours": r"(?P<fours>[1-9]\d*)", "quads": r"(?P<quads>[1-9]\d*)",
     "buffers": r"(?P<buffers>(?:layout\(location = \d\) out vec4 result_\d;\n)+)",
     "cleared": r"(?P<cleared>(?:result_\d = vec4\(0\.0, 0\.0, 0\.0, 1\.0\);\n)+)",
 }  # fmt: skip
@@ -564,5 +564,5 @@ def parts_of(match: re.Match[str]) -> dict[str, str] | None:
 def _each(line: str) -> str:
     """Return the pattern of lines, one for each image."""
     text = re.escape(line.replace("$", "@"))
-    text = text.replace("IMAGE", r"image_\w+").replace("NUMBER", r"\d+").replace("BLOCK", r"Image_\w+")
+    text = text.replace("IMAGE", r"image_\w+").replace("NUMBER", r"[1-9]\d*").replace("BLOCK", r"Image_\w+")
     return rf"(?P<images>(?:{text}\n)+)"

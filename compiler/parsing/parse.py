@@ -117,8 +117,8 @@ class Parser(Expressions):
         images = self._images(parts["images"])
         constants = tuple(map(self._constant, parts.get("constants", "").splitlines()))
         known = {each.name: each.value for each in constants}
-        if set(re.findall(r"#undef (\w+)", parts.get("undefined", ""))) - {*known}:
-            raise Unread("an #undef of what is not a constant of this source")
+        if "undefined" in parts and {*re.findall(r"#undef (\w+)", parts["undefined"])} != {*known}:
+            raise Unread("other constants than those that an #undef ends")
         self._vectors(known.get("LANES"))
         self.buffers()
         self._read(parts.get("functions", ""))

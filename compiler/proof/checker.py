@@ -26,6 +26,7 @@ import numpy as np
 
 from ...refimpl.reading import refusing
 from .evidence import (
+    AGAINST,
     FIRST_PASS,
     INTEGERS,
     Refused,
@@ -72,7 +73,10 @@ def check(path: Path) -> dict[str, Any]:
     told = "must be a complete certificate next to its kernel", "compile the model again"
     with refusing("certificate", str(path), *told), np.errstate(over="ignore", invalid="ignore"):
         held, manifest, text, arrays, raw = read(path)
-        if held["schema"] == INTEGERS:
+        kind = 1 if held["schema"] == INTEGERS else 2 if "factored" in held else 0
+        same("bound: against", held["bound"]["against"], AGAINST[kind])
+        if kind == 1:
+            same("integers of two kernels", "factored" in held, False)
             check_integers(held, text, arrays)
             same("manifest: bound", manifest["bound"]["output"], held["bound"]["output"])
             return held
@@ -90,6 +94,8 @@ def check(path: Path) -> dict[str, Any]:
         same("outputs", [o["output"] for o in held["outputs"]], numbers)
         first, joint = None, []
         if "spectra" in held:
+            (rows, columns, _), _ = inputs_of(text)
+            same("spectra: a window along one axis, or of two kernels", [rows, cut], [columns, None])
             tables = Tables(held["spectra"], *arrays_of(layers[0], arrays), raw, *box[:2])
             joint = joint_steps(layers, held["outputs"], tables)
             for output, added in zip(held["outputs"], joint, strict=True):
@@ -113,13 +119,17 @@ def check(path: Path) -> dict[str, Any]:
 def _cut(path: Path, held: Any, manifest: Any, text: str, arrays: Any, promise: Any) -> Cut:
     """Return the steps of a first layer of low rank, of which the manifest states no less."""
     before, stated, whole = path.with_name(FIRST_PASS + path.name), manifest["factored"], held["factored"]
-    check(before)
+    only = {"spectra", "factored"} & {*check(before)}
+    same("first kernel: what no sums along a row have", only, set())
     _, first, first_text, first_arrays, _ = read(before)
     for key in ("target", "language", "profile", "sine"):
         same(f"first kernel: {key}", first[key], manifest[key])
     same("first kernel: centre", first["window"]["centre"], manifest["window"]["centre"])
-    keys = [{*stated}, {*stated["cut"]}, stated["rank"]]
-    same("manifest: what it states of the rank", keys, [*STATED, first["output"]["channels"]])
+    keys = [{*stated}, {*stated["cut"]}, stated["rank"], type(stated["rank"])]
+    same("manifest: what it states of the rank", keys, [*STATED, first["output"]["channels"], int])
+    in_fours = manifest["target"].partition(":")[0] in ("opengl", "glsl-es", "shadertoy", "godot")
+    split = [image["name"] for image in manifest["images"]] != [FIRST_PASS[:-1]]
+    same("second kernel: images of four channels, of a fragment shader", split, in_fours)
     name = network_of(text)[0][0]["weight"]
     same("program that was cut: its matrix", [*whole["parameters"]], [name])
     floats = {key: array.astype("<f4") for key, array in arrays.items()} | parameters_of(whole, [])
@@ -189,9 +199,10 @@ def cut_steps(texts: tuple[str, str, str], held: tuple[Any, Any, Any], promise: 
     rank, bias = len(horizontal), arrays_of(layers[0], arrays)[1]
     taps, between = inputs_of(after)
     same("second kernel: window", taps, (rows, 1, border))
-    names_between, name = [image[0] for image in between], FIRST_PASS[:-1]
-    named = names_between in ([name], [f"{name}_{n}" for n in range(len(between))])
-    same("second kernel: images are the first one's result", named, True)
+    name, fours = FIRST_PASS[:-1], range(0, rank, 4)
+    ways = [(name, rank)], [(f"{name}_{n}", min(4, rank - at)) for n, at in enumerate(fours)]
+    held_as = [(image, channels) for image, channels, *_ in between]
+    same("second kernel: images are the first one's result", held_as in ways, True)
     vertical = arrays[names[0]].reshape(-1, rank)
     product, magnitude = (
         (a @ b).reshape(weight.shape)
@@ -207,11 +218,11 @@ def cut_steps(texts: tuple[str, str, str], held: tuple[Any, Any, Any], promise: 
     stated = ends_of_window(after)
     inside = bool((stated[0] <= ends[0]).all() and (ends[1] <= stated[1]).all())
     same("second kernel: its images hold what the first one writes", inside, True)
-    window = *ends, [*np.arange(rows * rank).reshape(rows, rank)] if rows > 1 else None
+    of_rows = [*np.arange(rows * rank).reshape(rows, rank)] if rows > 1 else None
     _, least, most = _sum(weight, bias, low, high, parts)
     passed, left = np.abs(arrays[names[0]]) @ np.tile(error, rows), off @ largest
     most_of_all = float((np.abs(weight) @ largest).max())
-    return Cut(window, passed + left, least, most, float(left.max()), most_of_all)
+    return Cut((ends[0], ends[1], of_rows), passed + left, least, most, float(left.max()), most_of_all)
 
 
 def arrays_of(layer: Any, arrays: Any) -> tuple[Any, Any]:

@@ -21,6 +21,16 @@ FLOATS, INTEGERS = "wamnet-certificate-1", "wamnet-integers-1"
 FIRST_PASS = "horizontal."
 """What the names of the files of a first layer's first kernel begin with (FAC-6)."""
 
+AGAINST = (
+    "float64 reference, same float32 weights and images",
+    "reference in integers, the same bits",
+    "float64 reference of the program that was cut",
+)
+"""What bounds compare a kernel with: of floats, of integers, of two kernels (CER-9)."""
+
+OTHER = re.compile(r"program|  (?:window|image|output|parameter) .+")
+"""The other lines of a program's text."""
+
 NODE = re.compile(r"  %(\d+) = (\w+)((?: %\d+,?)*)(?: \{(.*)\})? : \w+(?:\[(\d+)\])?")
 """A line of a program's text: number, operation, operands, attributes, length of the result."""
 
@@ -81,7 +91,10 @@ def digest_of(text: str, arrays: Any) -> str:
 
 def nodes_of(text: str) -> list[re.Match[str]]:
     """Return the lines of a program's operations: each has its place for a number, and reads earlier ones."""
-    found = [m for m in map(NODE.fullmatch, text.splitlines()) if m]
+    lines = text.splitlines()
+    found = [m for m in map(NODE.fullmatch, lines) if m]
+    rest = [line for line in lines if not NODE.fullmatch(line) and not OTHER.fullmatch(line)]
+    same("program: lines of no kind", rest, [])
     for number, line in enumerate(found):
         same("program: number of a line", int(line[1]), number)
         given = [int(i) for i in re.findall(r"%(\d+)", line[3])]
@@ -99,6 +112,7 @@ def parameters_of(held: Any, raw: Any) -> dict[str, Any]:
             at = places(name, place, len(raw))
             array = raw[at if at.min() >= 0 else len(raw)]
         arrays[name] = array.reshape(place["shape"])
+        same(f"{name}: shape", [*arrays[name].shape], place["shape"])
     return arrays
 
 
@@ -112,14 +126,15 @@ def check_manifest(manifest: Any, text: str, count: int) -> None:
     same("manifest: schema", manifest["schema"], "wamnet-artifact-1")
     window, output, schedule, given = (manifest[key] for key in ("window", "output", "schedule", "images"))
     counted = [window["size"], window["centre"], output["channels"], *(image["channels"] for image in given)]
-    counted += [manifest["weights"]["count"], *schedule.get("group", ())]
+    sides = [window.get(key, window["size"]) for key in ("rows", "columns")]
+    counted += [manifest["weights"]["count"], *schedule.get("group", ()), *sides]
     counted += [schedule.get(key, 1) for key in ("pixels", "rows")]
     same("manifest: sizes are integers above -1", all(type(n) is int and n >= 0 for n in counted), True)
     names = [manifest["target"], manifest["entry_point"], schedule["name"]]
     same("manifest: target, entry point and schedule are texts", all(isinstance(n, str) for n in names), True)
     taps, images = inputs_of(text)
-    sides = [window.get(key, window["size"]) for key in ("rows", "columns")]
     same("manifest: window", (*sides, window["border"]), taps)
+    same("manifest: size of the window", window["size"], max(sides))
     stated = [(i["name"], i["channels"], i.get("whole", False), i["low"], i["high"]) for i in given]
     same("manifest: images", stated, images)
     same("program: ranges of images", all(low <= high for *_, low, high in images), True)

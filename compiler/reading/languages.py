@@ -40,8 +40,8 @@ def is_read(manifest: Mapping[str, Any]) -> bool:
     """Return whether the text of a kernel is of a kind that is read, by its manifest (TXT-7)."""
     target, schedule = language_of(manifest), manifest["schedule"]["name"]
     known_sines = not manifest["sine_arguments"] or manifest["profile"]["name"].startswith(READ_PROFILE)
-    home = manifest["target"].partition(":")[2]
-    if target not in TITLES or not known_sines or home not in ("", "inline", "uniform"):
+    places = target, f"{target}:inline", f"{target}:uniform"
+    if target not in TITLES or not known_sines or manifest["target"] not in places:
         return False
     begins = (OF_FLOATS if any(manifest["bound"]["output"]) else OF_INTEGERS).get(target, ())
     return bool(schedule == "plain" or schedule.startswith(begins))

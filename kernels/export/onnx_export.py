@@ -14,10 +14,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ...compiler.compile import AGAINST_WHOLE
 from ...compiler.core.ir import Node, Program
 from ...compiler.core.lower import lower
 from ...compiler.core.passes import pipeline
+from ...compiler.proof.evidence import AGAINST
 from ...compiler.schedules.common import kernel_gather
 from ...refimpl.errors import ExecutorUnavailable
 from ...refimpl.network.dataset import FEATURES
@@ -169,7 +169,7 @@ def promise(model: Model) -> dict[str, Any]:
         return {
             "language": WHOLE_TEXT,
             "profile": {"name": "ieee", "text": "no operation rounds"},
-            "bound": {"output": [0.0] * len(model.siren.biases[-1]), "against": AGAINST_WHOLE},
+            "bound": {"output": [0.0] * len(model.siren.biases[-1]), "against": AGAINST[1]},
             "assumes": ASSUMES,
         }
     return {

@@ -124,6 +124,17 @@ H = ("factored", "horizontal")
         ("held", ("factored", "program"), "program\n", "."),
         ("first", ("program_digest",), "0" * 64, "digest of the program"),
         ("first", ("outputs", 0, "scalings"), [[1.0]], "sizes of scalings"),
+        ("held", ("bound", "against"), evidence.AGAINST[0], "bound: against"),
+        ("manifest", ("factored", "rank"), 6.0, "of the rank"),
+        ("manifest", ("window", "size"), 4, "window"),
+        ("manifest", ("window", "rows"), 3.0, "integers above"),
+        ("manifest", ("entry_point",), "other", "entry point"),
+        (
+            "held",
+            ("factored", "program"),
+            lambda text: f"{text}  %0 = nothing\n",
+            "program that was cut|lines of no kind",
+        ),
     ],
 )
 def test_other_kernels_are_refused_by_name(path, tmp_path, key, place, value, match):
@@ -186,7 +197,7 @@ RULES = {
     "what the rank leaves out": ("off @ largest\n", "0 * off @ largest\n"),
     "float64's rounding of the product": ("(rank + 2) * 2.0**-52", "0.0 * (rank + 2)"),
     "what the first kernel may write": ("(least - error, most + error)", "(0.5 * least, 0.5 * most)"),
-    "both are passed on": ("Cut(window, passed + left,", "Cut(window, left,"),
+    "both are passed on": ("passed + left, least", "left, least"),
     "times omega_0": ("scale * passed, scale * reach", "passed, scale * reach"),
 }
 """A rule made weaker, in the checker's text."""
@@ -213,6 +224,36 @@ def test_each_rule_is_needed(path, rule):
     found = [errors(of) for of in (vars(checker), weaker)]
     assert (found[1] <= found[0]).all()
     assert found[1].sum() < found[0].sum()
+
+
+def test_integers_are_of_one_kernel(path, tmp_path):
+    """A certificate of integers beside the files of two kernels, whatever its digests say."""
+    held = {**certificate_of(path), "schema": evidence.INTEGERS}
+    held["bound"]["against"] = evidence.AGAINST[1]
+    with pytest.raises(Refused, match="integers of two kernels"):
+        checker.check(copied(path, tmp_path, held))
+
+
+@pytest.mark.parametrize(
+    "between", [["horizontal: 5"], ["horizontal_0: 2", "horizontal_1: 4"], ["horizontal_0: 6"]]
+)
+def test_images_between_are_those_that_the_first_kernel_writes(path, between):
+    """KER-15: one, or of four channels each; not fewer or others, with as many channels together or not."""
+    held, _, text, arrays, _ = evidence.read(path)
+    _, _, first_text, first_arrays, _ = evidence.read(path.with_name(FIRST_PASS + NAME))
+    weight = evidence.parameters_of(held["factored"], [])["W0"].astype(np.float64)
+    (line,) = (line for line in text.splitlines() if line.startswith("  image horizontal: 6"))
+    ends = line.partition(" in ")[2]
+    text = text.replace(line, "\n".join(f"  image {each} in {ends}" for each in between))
+    with pytest.raises(Refused, match=r"images are the first one's result|numbers in a window"):
+        checker.cut_steps(
+            (held["factored"]["program"], first_text, text), (weight, first_arrays, arrays), None
+        )
+
+
+@pytest.mark.parametrize("target", ["c:inline", "opencl:inline"])
+def test_tables_of_both_kernels_are_read(target, tmp_path):
+    assert check_text(kernels(tmp_path, target))["sums"] == 9
 
 
 def text_of(path, first):

@@ -131,6 +131,11 @@ def test_weights_in_tables_and_blocks_are_those_of_the_file(target, tmp_path):
     ("target", "old", "new", "why"),
     [
         ("c:inline", "weights[383]", "weights[384]", "has room for 384"),
+        ("c:inline", "weights[383]", "weights[0577]", "frame|defines"),
+        ("opencl:uniform", "16 * 96", "16 * 0140", "frame"),
+        ("wgsl:uniform", "vec4<f32>, 96>", "vec4<f32>, 096>", "frame"),
+        ("c:inline", "0.325407952f}", "-1u}", "not those of weights.bin"),
+        ("c:inline", "#undef WINDOW_SIZE\n", "", "other constants"),
         ("c:inline", "0.325407952f}", "0.325407952f, 0.0f}", "not those of weights.bin"),
         ("c:inline", "0.325407952f}", "0.325407982f}", "not those of weights.bin"),
         ("opencl:inline", "0.325407952f}", "(-0.325407952f)}", "not those of weights.bin"),

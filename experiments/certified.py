@@ -36,6 +36,7 @@ KERNELS = (
     "opengl:plain", "c:plain", "c:tile:8", "c:fft:8", "c:plain:whole8", "c:dot:16:whole8", "wgsl:plain",
     "wgsl:group:4", "cuda:plain", "cuda:group:4", "opencl:tile:16:whole8", "cuda:groupdot:4:whole8",
     "wgsl:groupdot:4:whole8", "opencl:groupdot:4:whole8", "glsl-vulkan:groupdot:4:whole8",
+    "opencl:tile:16:rank16", "opengl:plain:rank16", "cuda:group:4:rank16",
 )  # fmt: skip
 """Targets, schedules and variants."""
 

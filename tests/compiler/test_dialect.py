@@ -57,6 +57,7 @@ print("opencl" in loaded("languages"), "fft" in loaded("schedules"), "cuda" in l
 """
 
 
+@pytest.mark.needs("programs")
 def test_a_language_and_a_schedule_are_imported_when_they_are_asked_for():
     """Whoever compiles for one target waits for no other one's words, and reads none."""
     done = subprocess.run([sys.executable, "-c", ASKED], capture_output=True, text=True, check=True)

@@ -47,6 +47,7 @@ def grow(at: Path, tree: object, outside: Path) -> None:
         at.chmod(0)
 
 
+@pytest.mark.needs("programs")
 @settings(max_examples=40, deadline=None)
 @given(TREES)
 def test_whatever_is_in_a_folder_goes_and_nothing_else(tree) -> None:
@@ -70,6 +71,7 @@ def test_folders_deeper_than_recursion_and_paths_go(tmp_path) -> None:
     assert not folder.exists()
 
 
+@pytest.mark.needs("programs")
 def test_a_temporary_folder_may_be_gone_at_its_end() -> None:
     with temporary("test") as folder:
         folder.rmdir()
@@ -163,6 +165,7 @@ def test_without_a_home_drivers_get_a_temporary_cache(drivers, monkeypatch) -> N
     assert Path(os.environ["XDG_CACHE_HOME"]).is_dir()
 
 
+@pytest.mark.needs("programs")
 def test_programs_are_built_where_they_run(tmp_path, monkeypatch) -> None:
     monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
     real = folders.runs_programs

@@ -10,7 +10,7 @@ else:
 
 ROOT = Path(__file__).parents[2]
 
-MAX_LINES = 59_966
+MAX_LINES = 59_886
 """Most lines of the packages in pyproject.toml, comments counted (62,568 at 5756b297). It only falls:
 a change that removes lines lowers it in the same commit, and raising it needs an issue that says so."""
 

@@ -212,6 +212,7 @@ def test_variants_are_within_their_bound(executor, model, variant) -> None:
 # ---- the list of contenders --------------------------------------------------------------------------------
 
 
+@pytest.mark.needs("packages")
 def test_names_are_unique_and_schedules_complete() -> None:
     from wamnet.compiler.targets import LANGUAGES, TARGETS
 
@@ -228,6 +229,7 @@ def test_names_are_unique_and_schedules_complete() -> None:
     assert {each.name for each in few} < set(names)
 
 
+@pytest.mark.needs("packages")
 def test_an_executor_that_is_missing_is_in_the_list(monkeypatch, model) -> None:
     """And says in its row what is missing."""
 

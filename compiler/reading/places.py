@@ -117,9 +117,9 @@ class Place:
             raise Wrong(OTHERWISE)
         values, (own, extent) = va - vb, fa - fb
 
-        def refuse(bad: Any, why: str) -> None:
+        def refuse(bad: Any, why: str, kind: type[Exception] = Wrong) -> None:
             if np.any(bad if mask is None else np.logical_and(bad, mask)):
-                raise Wrong(why)
+                raise kind(why)
 
         if axis is not None:
             plain = (np.abs(own) <= 1) & (np.abs(extent) <= 1) & (own * extent <= 0)
@@ -130,8 +130,8 @@ class Place:
             refuse(there & (np.abs(rest) > cap), f"it compares a coordinate with a constant beyond {cap}")
             if lanes.steps:
                 alone = rest * (own + extent) * (own * extent == 0)
-                why = "it compares a coordinate with a constant as large as a group"
-                refuse(alone <= -lanes.steps[axis], why)
+                why = "coordinates that are compared with a constant as large as a group"
+                refuse(alone <= -lanes.steps[axis], why, Unread)
         found: NDArray[np.bool_] = COMPARES[what](values, 0)
         return found
 

@@ -53,7 +53,7 @@ MOST = 2**20
 TOGETHER = 64
 """Turns of loops are run at once while there are fewer of them than this."""
 
-LARGEST = 2**23
+LARGEST = 2**22
 """Turns of loops are run at once if there are no more numbers than this, one for each turn and lane."""
 
 LONGEST = 2**12
@@ -171,8 +171,7 @@ class Trial(Values):
         if statement.add:
             away = value.op == "negative"
             number = self.value(value.args[0] if away else value)
-            product = value.op == "multiply"
-            if not away and self._added(statement.array, index, kind, number, product):
+            if not away and self._added(statement.array, index, kind, number, value.op == "multiply"):
                 return
             read = self._load(statement.array, index, kind)
             total = self.operate("subtract" if away else "add", read, number)
@@ -295,7 +294,8 @@ class Trial(Values):
             turns = range(start, count, step)
             for last in turns[-1:]:
                 self._of_indices("add", last, step)
-            together = 1 < len(turns) <= LARGEST // (self.lanes.count * self.turns.count)
+            most = LARGEST // 2 if self.claim.stated else LARGEST  # words have four numbers
+            together = 1 < len(turns) <= most // (self.lanes.count * self.turns.count)
             key = id(statement), self.turns.count
             together = together and self.turns.count < TOGETHER and self.apart[key] < TRIES
             if together and self._at_once(statement, turns):

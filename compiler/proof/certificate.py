@@ -67,7 +67,9 @@ def prove(
     arrays = _floats(program if cut is None else cut[1])
     layers, box = checker.network_of(ir.text(program))
     matrices = [(layer["scale"] or 1.0) * arrays[layer["weight"]] for layer in layers]
-    if of is not None if len(layers) == 1 else not scaled.decomposable(matrices[1:]):
+    if len(layers) == 1 and of is not None:  # no scalings between layers, on which steps of spectra rest
+        return None
+    if len(layers) > 1 and not scaled.decomposable(matrices[1:]):
         return None
     groups = scaled.outputs(len(matrices[-1]))
     later = [[*matrices[1:-1], matrices[-1][rows]] if len(layers) > 1 else [] for rows in groups]

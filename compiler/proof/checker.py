@@ -5,7 +5,7 @@
 2. The text is that of a network of sines or rectifiers; anything else is refused [`_layers`].
 3. Each layer: magnitudes, rounding of sums in parts, the sine's error [`layer_steps`]; each output: how far
    each layer's errors reach, by norms for the scalings in the certificate [`output_steps`]. Sums from spectra
-   have steps of their own [spectra_checker.py]. Of a first layer of low rank both kernels have a certificate:
+   have steps of their own [spectra_checker.py]. Both kernels of a low-rank first layer have a certificate:
    the second one's sums pass on the first one's bound, and what the rank leaves out [`cut_steps`].
 4. Elimination in integers proves that a matrix has a norm of at most N [`norm_is_below`].
    All other numbers are sums of magnitudes in float64, widened by more than it rounds.

@@ -77,10 +77,8 @@ def check_text(path: Path, source: Path | None = None) -> dict[str, int]:
     if not is_read(manifest):
         kind = f"schedule {manifest['schedule']['name']}, profile {manifest['profile']['name']}"
         raise Unread(f"texts of target {manifest['target']} with {kind}")
-    prefix, point = (
-        FIRST_PASS if path.name.startswith(FIRST_PASS) else "",
-        ENTRIES.get(language_of(manifest), "main"),
-    )
+    prefix = FIRST_PASS if path.name.startswith(FIRST_PASS) else ""
+    point = ENTRIES.get(language_of(manifest), "main")
     is_first = point == "wamnet_pixel" and manifest["entry_point"] == "wamnet_horizontal_pixel"
     if not is_first or "factored" in held:
         wanted = "wamnet_horizontal_pixel" if prefix and point == "wamnet_pixel" else point
